@@ -1,0 +1,105 @@
+//! The walk over the markers of a JPEG (ITU-T T.81, annex B).
+
+use super::Header;
+use super::frame::Frame;
+use super::marker;
+use crate::reader::Reader;
+use crate::{Error, ErrorKind, Limits, Result};
+
+/// Reads as far as the frame header.
+pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header> {
+    let mut reader = Reader::new(bytes);
+    start(&mut reader)?;
+    loop {
+        let at = reader.position();
+        match marker::next(&mut reader)? {
+            code @ (marker::SOF0 | marker::SOF1 | marker::SOF2) => {
+                return Ok(Frame::read(&mut reader, code == marker::SOF2, limits)?.header);
+            }
+            marker::EOI | marker::SOS => {
+                return Err(Error::malformed("the end of the headers", "a frame header (SOF)").at(at));
+            }
+            code => skip(&mut reader, code, at)?,
+        }
+    }
+}
+
+/// Reads the whole file, up to its EOI marker and the zero bytes that may follow it.
+pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Header> {
+    let mut reader = Reader::new(bytes);
+    start(&mut reader)?;
+    let mut frame: Option<Frame> = None;
+    let mut restart_interval = 0;
+    let mut scans = 0u32;
+    loop {
+        let at = reader.position();
+        match marker::next(&mut reader)? {
+            code @ (marker::SOF0 | marker::SOF1 | marker::SOF2) => {
+                if frame.is_some() {
+                    return Err(Error::malformed("a second frame header", "one").at(at));
+                }
+                frame = Some(Frame::read(&mut reader, code == marker::SOF2, limits)?);
+            }
+            marker::DRI => restart_interval = read_restart_interval(&mut reader)?,
+            marker::SOS => {
+                scans = scans.saturating_add(1);
+                if scans > limits.max_scans_per_image {
+                    let expected = format!("at most {} (max_scans_per_image)", limits.max_scans_per_image);
+                    return Err(
+                        Error::new(ErrorKind::Limit, format!("{scans} scans or more"), expected).at(at)
+                    );
+                }
+                let Some(frame) = frame.as_mut() else {
+                    return Err(Error::malformed("a scan", "a frame header (SOF) before it").at(at));
+                };
+                frame.read_scan(&mut reader, restart_interval)?;
+            }
+            marker::EOI => {
+                let Some(frame) = frame else {
+                    return Err(Error::malformed("the end of the image", "a frame header (SOF)").at(at));
+                };
+                frame.require_complete(at)?;
+                if reader.rest().iter().any(|&byte| byte != 0) {
+                    let found = format!("{} bytes after the end of the image", reader.rest().len());
+                    return Err(Error::malformed(found, "none, or zeros").at(reader.position()));
+                }
+                return Ok(frame.header);
+            }
+            code => skip(&mut reader, code, at)?,
+        }
+    }
+}
+
+fn start(reader: &mut Reader<'_>) -> Result<()> {
+    match reader.take(2)? {
+        [0xFF, marker::SOI] => Ok(()),
+        other => Err(Error::malformed(format!("{other:02x?}"), "a JPEG, which starts with ff d8").at(0usize)),
+    }
+}
+
+/// Steps over a segment that only the decoder reads; refuses every other marker.
+fn skip(reader: &mut Reader<'_>, code: u8, at: usize) -> Result<()> {
+    match code {
+        marker::DHT | marker::DQT | marker::COM | marker::APP0..=marker::APP15 => {
+            marker::segment(reader)?;
+            Ok(())
+        }
+        0xC3..=0xCF => {
+            let found = format!("the marker ff{code:02x} (lossless, hierarchical or arithmetic coding)");
+            Err(Error::new(ErrorKind::Unsupported, found, "a baseline or progressive Huffman JPEG").at(at))
+        }
+        0xDC => {
+            let found = "the number of rows after the first scan (DNL)";
+            Err(Error::new(ErrorKind::Unsupported, found, "it in the frame header").at(at))
+        }
+        _ => Err(Error::malformed(format!("the marker ff{code:02x}"), "a marker that may stand here").at(at)),
+    }
+}
+
+fn read_restart_interval(reader: &mut Reader<'_>) -> Result<u64> {
+    let at = reader.position();
+    match marker::segment(reader)? {
+        [high, low] => Ok(u64::from(u16::from_be_bytes([*high, *low]))),
+        other => Err(Error::malformed(format!("a restart interval of {} bytes", other.len()), "2").at(at)),
+    }
+}

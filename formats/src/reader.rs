@@ -1,0 +1,51 @@
+//! A cursor over a byte slice whose every read is checked.
+
+use crate::{Error, Result};
+
+/// Reads big-endian fields one after another; errors name the byte where the missing field starts.
+#[derive(Debug, Clone)]
+pub(crate) struct Reader<'a> {
+    bytes: &'a [u8],
+    position: usize,
+}
+
+impl<'a> Reader<'a> {
+    pub(crate) fn new(bytes: &'a [u8]) -> Self {
+        Reader { bytes, position: 0 }
+    }
+
+    pub(crate) fn position(&self) -> usize {
+        self.position
+    }
+
+    /// What has not been read yet.
+    pub(crate) fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.position..).unwrap_or(&[])
+    }
+
+    /// The next `len` bytes.
+    pub(crate) fn take(&mut self, len: usize) -> Result<&'a [u8]> {
+        let end = self.position.checked_add(len);
+        let taken = end.and_then(|end| self.bytes.get(self.position..end));
+        let (Some(taken), Some(end)) = (taken, end) else {
+            let left = self.rest().len();
+            return Err(Error::malformed(
+                format!("the end of the data after {left} more bytes"),
+                format!("{len} more bytes"),
+            )
+            .at(self.position));
+        };
+        self.position = end;
+        Ok(taken)
+    }
+
+    pub(crate) fn u8(&mut self) -> Result<u8> {
+        let byte = self.take(1)?;
+        Ok(byte.first().copied().unwrap_or_default())
+    }
+
+    pub(crate) fn u16(&mut self) -> Result<u16> {
+        let pair = self.take(2)?;
+        Ok(pair.iter().fold(0, |value, &byte| (value << 8) | u16::from(byte)))
+    }
+}

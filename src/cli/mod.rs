@@ -1,0 +1,189 @@
+//! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+mod analyse;
+mod demo;
+mod enlarge;
+mod image;
+mod import;
+mod info;
+mod progress;
+mod sample;
+mod table;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use btfkit::error::{Error, Kind, Result};
+use btfkit::run::Context;
+use btfkit::run::progress::{Progress, Silent};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use serde_json::Value;
+
+const EXAMPLES: &str = "\
+Examples:
+  btf demo                                      the whole method on a made material, with a page of pictures
+  btf import UBO_WOOD256.zip wood.zarr          archive to measurement
+  btf model wood.zarr wood.model.zarr           measurement to model: tile, clusters, normals, random field
+  btf enlarge wood.model.zarr big.zarr --size 4096x4096
+  btf image big.zarr --light 15,0 --view 0,0 --out big.png
+
+Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input not there yet,
+74 input/output, 75 stopped early (run the same command again).";
+
+/// Turns a measured Bidirectional Texture Function into a small model that covers any surface.
+#[derive(Parser)]
+#[command(name = "btf", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Args)]
+struct Common {
+    /// Threads to use [default: all cores]
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<usize>,
+    /// Memory to use, such as 512MiB or 2GiB
+    #[arg(long, global = true, default_value = "2GiB", value_parser = parse_bytes, value_name = "SIZE")]
+    memory: u64,
+    /// How to tell progress
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    progress: ProgressStyle,
+    /// Say nothing but errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ProgressStyle {
+    /// Bars on a terminal, nothing elsewhere.
+    Auto,
+    /// A JSON object a line on standard error, for schedulers.
+    Json,
+    /// Nothing.
+    None,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Demo(demo::Demo),
+    Sample(sample::Sample),
+    Info(info::Info),
+    Import(import::Import),
+    Model(analyse::Whole),
+    Tile(analyse::Tile),
+    Cluster(analyse::Cluster),
+    Normals(analyse::Normals),
+    Fit(analyse::Fit),
+    Compare(analyse::Compare),
+    Enlarge(enlarge::Enlarge),
+    Image(image::Image),
+}
+
+/// Runs the program.
+pub(crate) fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let threads = cli
+        .common
+        .threads
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+        .max(1);
+    // zarrs decodes chunks on the global pool.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
+        let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
+    }
+    let progress: Box<dyn Progress> = match cli.common.progress {
+        _ if cli.common.quiet => Box::new(Silent),
+        ProgressStyle::None => Box::new(Silent),
+        ProgressStyle::Json => Box::new(progress::Lines::default()),
+        ProgressStyle::Auto => Box::new(progress::Bars::default()),
+    };
+    let context =
+        Context { progress: progress.as_ref(), stop: &stop, threads, memory_bytes: cli.common.memory };
+    let tell = Tell { quiet: cli.common.quiet };
+    let result = match &cli.command {
+        Command::Demo(command) => command.run(&context, tell),
+        Command::Sample(command) => command.run(&context, tell),
+        Command::Info(command) => command.run(tell),
+        Command::Import(command) => command.run(&context, tell),
+        Command::Model(command) => command.run(&context, tell),
+        Command::Tile(command) => command.run(&context, tell),
+        Command::Cluster(command) => command.run(&context, tell),
+        Command::Normals(command) => command.run(&context, tell),
+        Command::Fit(command) => command.run(&context, tell),
+        Command::Compare(command) => command.run(&context, tell),
+        Command::Enlarge(command) => command.run(&context, tell),
+        Command::Image(command) => command.run(&context, tell),
+    };
+    progress.end();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("btf: {error}");
+            if let Some(hint) = error.guidance() {
+                eprintln!("  {hint}");
+            }
+            ExitCode::from(exit_code(error.kind()))
+        }
+    }
+}
+
+fn exit_code(kind: Kind) -> u8 {
+    match kind {
+        Kind::Internal => 1,
+        Kind::Usage => 2,
+        Kind::Input | Kind::Recipe => 65,
+        Kind::Missing => 66,
+        Kind::Io => 74,
+        Kind::Stopped => 75,
+    }
+}
+
+/// Where results are told.
+#[derive(Clone, Copy)]
+struct Tell {
+    quiet: bool,
+}
+
+impl Tell {
+    fn line(self, text: impl std::fmt::Display) {
+        if !self.quiet {
+            println!("{text}");
+        }
+    }
+
+    fn plan(self, summary: &Value) -> Result<()> {
+        let text =
+            serde_json::to_string_pretty(summary).map_err(|error| Error::internal(error.to_string()))?;
+        self.line(text);
+        Ok(())
+    }
+}
+
+/// Bytes from text such as 512MiB, 2GiB, 2G or 1000000.
+fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
+    let expected = || format!("expected a size such as 512MiB or 2GiB, got {text:?}");
+    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let number: u64 = text[..digits].parse().map_err(|_| expected())?;
+    let shift = match text[digits..].trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 0,
+        "k" | "kib" => 10,
+        "m" | "mib" => 20,
+        "g" | "gib" => 30,
+        "t" | "tib" => 40,
+        _ => return Err(expected()),
+    };
+    number.checked_mul(1 << shift).filter(|&bytes| bytes > 0).ok_or_else(expected)
+}
+
+/// Bytes for people.
+fn bytes_text(bytes: u64) -> String {
+    indicatif::HumanBytes(bytes).to_string()
+}

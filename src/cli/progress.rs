@@ -1,0 +1,127 @@
+//! Progress for people (bars with rate and time left) and for schedulers (JSON lines).
+
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use btfkit::run::progress::{Counted, Progress};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Least time between two JSON lines.
+const LINE_INTERVAL: Duration = Duration::from_secs(1);
+
+/// A bar on the terminal for the step under way; nothing where standard error is no terminal.
+#[derive(Default)]
+pub(super) struct Bars {
+    bar: Mutex<Option<ProgressBar>>,
+}
+
+impl Bars {
+    fn with(&self, act: impl FnOnce(&ProgressBar)) {
+        if let Some(bar) = &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
+            act(bar);
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn begin(&self, title: &str, total: u64, counted: Counted) {
+        let template = match counted {
+            Counted::Items(_) => {
+                "{prefix:>20} {bar:32} {human_pos}/{human_len} ({per_sec}, {eta} left) {wide_msg}"
+            }
+            Counted::Bytes => {
+                "{prefix:>20} {bar:32} {bytes}/{total_bytes} ({bytes_per_sec}, {eta} left) {wide_msg}"
+            }
+        };
+        let bar = ProgressBar::new(total).with_prefix(title.to_owned());
+        bar.set_style(
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        if let Counted::Items(name) = counted {
+            bar.set_message(name);
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
+    }
+
+    fn advance(&self, count: u64) {
+        self.with(|bar| bar.inc(count));
+    }
+
+    fn remark(&self, text: &str) {
+        self.with(|bar| bar.set_message(text.to_owned()));
+    }
+
+    fn end(&self) {
+        if let Some(bar) = self.bar.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// A JSON object a line on standard error: when a step begins, about once a second, and when it ends.
+#[derive(Default)]
+pub(super) struct Lines {
+    step: Mutex<Option<Step>>,
+}
+
+struct Step {
+    title: String,
+    unit: &'static str,
+    done: u64,
+    total: u64,
+    began: Instant,
+    told: Instant,
+    remark: Option<String>,
+}
+
+impl Step {
+    fn tell(&self, event: &str) {
+        let seconds = self.began.elapsed().as_secs_f64();
+        let rate = self.done as f64 / seconds.max(1e-9);
+        let left = (self.done > 0).then(|| self.total.saturating_sub(self.done) as f64 / rate);
+        eprintln!(
+            "{}",
+            serde_json::json!({
+                "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
+                "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
+            })
+        );
+    }
+}
+
+impl Progress for Lines {
+    fn begin(&self, title: &str, total: u64, counted: Counted) {
+        let unit = match counted {
+            Counted::Items(name) => name,
+            Counted::Bytes => "bytes",
+        };
+        let now = Instant::now();
+        let step =
+            Step { title: title.to_owned(), unit, done: 0, total, began: now, told: now, remark: None };
+        step.tell("begin");
+        *self.step.lock().unwrap_or_else(PoisonError::into_inner) = Some(step);
+    }
+
+    fn advance(&self, count: u64) {
+        if let Some(step) = &mut *self.step.lock().unwrap_or_else(PoisonError::into_inner) {
+            step.done += count;
+            if step.told.elapsed() >= LINE_INTERVAL {
+                step.told = Instant::now();
+                step.tell("progress");
+            }
+        }
+    }
+
+    fn remark(&self, text: &str) {
+        if let Some(step) = &mut *self.step.lock().unwrap_or_else(PoisonError::into_inner) {
+            step.remark = Some(text.to_owned());
+        }
+    }
+
+    fn end(&self) {
+        if let Some(step) = self.step.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            step.tell("end");
+        }
+    }
+}

@@ -1,0 +1,74 @@
+use std::path::PathBuf;
+
+use btfkit::error::Result;
+use btfkit::run::Context;
+use btfkit::sample::Kind;
+use btfkit::shape::Size;
+use btfkit::stage::sample;
+use clap::{Args, ValueEnum};
+
+use super::{Tell, bytes_text};
+
+/// Make a synthetic measurement in UBO2003's layout
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf sample leather.zip
+  btf sample wood.zip --material wood --size 256x256 --seed 7
+  btf sample small.zip --size 64x64 --views 13 --lights 25")]
+pub(super) struct Sample {
+    /// The zip to write
+    archive: PathBuf,
+    /// Which material
+    #[arg(long, value_enum, default_value = "leather")]
+    material: Material,
+    /// Size of its images, WIDTHxHEIGHT
+    #[arg(long, default_value = "128x128")]
+    size: Size,
+    /// Number of views; 81 are those of UBO2003
+    #[arg(long, default_value_t = 81)]
+    views: usize,
+    /// Number of lights
+    #[arg(long, default_value_t = 81)]
+    lights: usize,
+    /// Seed of the material
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Size of its features relative to the default
+    #[arg(long, default_value_t = 1.0)]
+    scale: f64,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Material {
+    Wood,
+    Leather,
+}
+
+impl Sample {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let kind = match self.material {
+            Material::Wood => Kind::Wood,
+            Material::Leather => Kind::Leather,
+        };
+        let report = sample::run(
+            &sample::Options {
+                archive: self.archive.clone(),
+                kind,
+                size: self.size,
+                views: self.views,
+                lights: self.lights,
+                seed: self.seed,
+                scale: self.scale,
+            },
+            context,
+        )?;
+        tell.line(format!(
+            "{}: {} images, {}",
+            self.archive.display(),
+            report.images,
+            bytes_text(report.bytes)
+        ));
+        Ok(())
+    }
+}

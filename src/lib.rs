@@ -1,0 +1,28 @@
+//! btfkit turns a measured Bidirectional Texture Function into a small model that covers a surface
+//! of any size (Filip and Haindl 2007, "BTF modelling using BRDF texels").
+//!
+//! Data flows to the right only:
+//!
+//! ```text
+//! archive -import-> measurement -tile, cluster, normals, fit-> model -enlarge-> enlarged index -image-> pictures
+//! ```
+//!
+//! [`stage`] holds one module a step, [`store`] what lies on disk, [`run`] what makes long work
+//! survive, [`texel`], [`mrf`] and [`color`] the science, [`kernel`] the hot loops.
+
+pub mod archive;
+pub mod color;
+pub mod demo;
+pub mod error;
+pub mod kernel;
+pub mod mrf;
+pub mod picture;
+pub mod random;
+pub mod run;
+pub mod sample;
+pub mod shape;
+pub mod stage;
+pub mod store;
+pub mod texel;
+
+pub use error::{Error, Kind, Result};

@@ -1,0 +1,204 @@
+//! A fitted model: what a synthesis needs, and what the recipe should tell about it.
+
+use nalgebra::DMatrix;
+
+use super::car::{Prior, cholesky};
+use super::stability::{self, STABLE_RADIUS};
+use crate::error::{Error, Result};
+
+/// How far T T^T may be from the identity, in any entry.
+const ORTHONORMAL_TOLERANCE: f64 = 1e-6;
+
+/// Whether the channels are modelled together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// 3D CAR, (9): all channels at once.
+    Car3d,
+    /// 2D CAR, (18): one scalar model a channel, after the Karhunen-Loeve transformation.
+    Car2d,
+}
+
+/// A field model: mean, transformation, and one causal autoregressive field a pyramid level.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Which equations hold.
+    pub kind: Kind,
+    /// Mean of each channel of the data.
+    pub mean: Vec<f64>,
+    /// T of (15), `[channels, channels]`, rows the eigenvectors; 2D only.
+    pub transform: Option<DMatrix<f64>>,
+    /// Level 0 is the finest.
+    pub levels: Vec<Level>,
+}
+
+/// The autoregressive field of one pyramid level.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// Sites (dy, dx) of Y_{r-s}.
+    pub neighbourhood: Vec<[i32; 2]>,
+    /// 3D: Gamma of (9), `[channels, channels * sites]`, sites outermost. 2D: gamma of (19), `[channels, sites]`.
+    pub gamma: DMatrix<f64>,
+    /// 3D: the covariance of e, `[channels, channels]`. 2D: its variances, `[channels, 1]`.
+    pub sigma: DMatrix<f64>,
+    /// The prior that the estimates hold.
+    pub prior: Prior,
+    /// Log evidence of the neighbourhood, the sum over channels if 2D.
+    pub log_evidence: f64,
+    /// Spectral radius of the recursion ([`stability::radius`]), below 1.
+    pub radius: f64,
+    /// Height and width of the level that was fitted.
+    pub size: [usize; 2],
+    /// What had to be done to make the field stable, if anything.
+    pub note: Option<String>,
+}
+
+impl Model {
+    /// The number of channels.
+    pub fn channels(&self) -> usize {
+        self.mean.len()
+    }
+
+    /// Checks what a synthesis relies on: shapes, finite values, causal neighbours, an orthonormal transformation,
+    /// positive definite noise, and stability, which is computed anew.
+    ///
+    /// # Errors
+    /// When any of it does not hold; the message says which, at which level.
+    pub fn check(&self) -> Result<()> {
+        let channels = self.channels();
+        if channels == 0 || self.levels.is_empty() {
+            return Err(Error::input("a field model needs at least one channel and one level"));
+        }
+        if !self.mean.iter().all(|value| value.is_finite()) {
+            return Err(Error::input("the mean of a field model is not finite"));
+        }
+        match (self.kind, &self.transform) {
+            (Kind::Car3d, None) => {}
+            (Kind::Car2d, Some(t)) if t.shape() == (channels, channels) => {
+                let off = (t * t.transpose() - DMatrix::identity(channels, channels)).map(f64::abs);
+                if !off.iter().all(|&entry| entry <= ORTHONORMAL_TOLERANCE) {
+                    return Err(Error::input(
+                        "the rows of the Karhunen-Loeve transformation are not orthonormal",
+                    ));
+                }
+            }
+            (Kind::Car3d, Some(_)) => {
+                return Err(Error::input("a 3D field model has no Karhunen-Loeve transformation"));
+            }
+            (Kind::Car2d, _) => {
+                return Err(Error::input(format!(
+                    "a 2D field model of {channels} channels needs a {channels} x {channels} transformation"
+                )));
+            }
+        }
+        for (k, level) in self.levels.iter().enumerate() {
+            level.check(self.kind, channels).map_err(|error| error.context(format!("level {k}")))?;
+        }
+        Ok(())
+    }
+}
+
+impl Level {
+    /// Gamma `[channels, channels * sites]` and Sigma `[channels, channels]` of all channels together. Scalar models
+    /// become diagonal blocks, so what reads these need not know the kind.
+    pub(super) fn joint(&self, kind: Kind) -> (DMatrix<f64>, DMatrix<f64>) {
+        if kind == Kind::Car3d {
+            return (self.gamma.clone(), self.sigma.clone());
+        }
+        let (channels, sites) = self.gamma.shape();
+        let mut gamma = DMatrix::zeros(channels, channels * sites);
+        for i in 0..channels {
+            for s in 0..sites {
+                gamma[(i, s * channels + i)] = self.gamma[(i, s)];
+            }
+        }
+        (gamma, DMatrix::from_diagonal(&self.sigma.column(0).into_owned()))
+    }
+
+    /// The spectral radius of the field, of its worst channel if 2D.
+    pub(super) fn measure_radius(&self, kind: Kind) -> Result<f64> {
+        stability::radius(&self.joint(kind).0, &self.neighbourhood)
+    }
+
+    fn check(&self, kind: Kind, channels: usize) -> Result<()> {
+        let sites = self.neighbourhood.len();
+        let (gamma, sigma) = match kind {
+            Kind::Car3d => ((channels, channels * sites), (channels, channels)),
+            Kind::Car2d => ((channels, sites), (channels, 1)),
+        };
+        for (name, matrix, shape) in [("gamma", &self.gamma, gamma), ("sigma", &self.sigma, sigma)] {
+            if matrix.shape() != shape {
+                let (got, expected) = (matrix.shape(), shape);
+                return Err(Error::input(format!("{name} has the shape {got:?}, expected {expected:?}")));
+            }
+            if !matrix.iter().all(|value| value.is_finite()) {
+                return Err(Error::input(format!("{name} is not finite")));
+            }
+        }
+        cholesky(self.joint(kind).1).map_err(|error| error.context("sigma"))?;
+        let radius = self.measure_radius(kind)?;
+        if radius < STABLE_RADIUS {
+            return Ok(());
+        }
+        Err(Error::input(format!(
+            "the field is not stable: radius {radius:.4}, it must be below {STABLE_RADIUS}"
+        ))
+        .hint("fit the model again"))
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// A model of one level from coefficients as they are stored.
+    pub(in crate::mrf) fn single(kind: Kind, sites: &[[i32; 2]], gamma: &[f64], sigma: &[f64]) -> Model {
+        let channels = if kind == Kind::Car3d { sigma.len().isqrt() } else { sigma.len() };
+        let level = Level {
+            neighbourhood: sites.to_vec(),
+            gamma: DMatrix::from_row_slice(channels, gamma.len() / channels, gamma),
+            sigma: DMatrix::from_row_slice(channels, sigma.len() / channels, sigma),
+            prior: Prior::weak(1.0, channels),
+            log_evidence: 0.0,
+            radius: 0.5,
+            size: [64, 64],
+            note: None,
+        };
+        let transform = (kind == Kind::Car2d).then(|| DMatrix::identity(channels, channels));
+        Model { kind, mean: vec![0.0; channels], transform, levels: vec![level] }
+    }
+
+    #[test]
+    fn scalar_models_become_diagonal_blocks() {
+        let model = single(Kind::Car2d, &[[0, 1], [1, 0]], &[0.1, 0.2, 0.3, 0.4], &[5.0, 6.0]);
+        let (gamma, sigma) = model.levels[0].joint(model.kind);
+        assert_eq!(gamma, DMatrix::from_row_slice(2, 4, &[0.1, 0.0, 0.2, 0.0, 0.0, 0.3, 0.0, 0.4]));
+        assert_eq!(sigma, DMatrix::from_row_slice(2, 2, &[5.0, 0.0, 0.0, 6.0]));
+        model.check().unwrap();
+    }
+
+    #[test]
+    fn damaged_models_are_refused() {
+        let sound = single(Kind::Car3d, &[[0, 1]], &[0.5, 0.1, 0.0, 0.5], &[1.0, 0.3, 0.3, 1.0]);
+        sound.check().unwrap();
+        let damages: [fn(&mut Model); 9] = [
+            |m| m.levels.clear(),
+            |m| m.mean[0] = f64::INFINITY,
+            |m| m.transform = Some(DMatrix::identity(2, 2)),
+            |m| m.kind = Kind::Car2d,
+            |m| m.levels[0].gamma[(0, 0)] = f64::NAN,
+            |m| m.levels[0].gamma[(0, 0)] = 1.01,
+            |m| m.levels[0].sigma[(1, 0)] = 1.5,
+            |m| m.levels[0].neighbourhood = vec![[0, -1]],
+            |m| m.levels[0].neighbourhood.push([1, 0]),
+        ];
+        for (n, damage) in damages.iter().enumerate() {
+            let mut model = sound.clone();
+            damage(&mut model);
+            assert!(model.check().is_err(), "damage {n}");
+        }
+        let mut skewed = single(Kind::Car2d, &[[0, 1]], &[0.5, 0.5], &[1.0, 1.0]);
+        skewed.transform = Some(DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 1.0]));
+        assert!(skewed.check().is_err());
+    }
+}

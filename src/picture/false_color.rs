@@ -1,0 +1,60 @@
+//! Pictures of what is not light: cluster numbers, normals, seams, differences.
+
+use crate::picture::Picture;
+use crate::random::Hash;
+use crate::shape::Size;
+
+/// Each cluster in a colour of its own, hashed from its number.
+pub fn index(size: Size, index: &[u16]) -> Picture {
+    let hash = Hash::new(0, u32::from_be_bytes(*b"hues"));
+    let color = |&cluster: &u16| {
+        let [hue, saturation, value, _] = hash.uniforms(u32::from(cluster), 0, 0);
+        hsv(hue, 0.35 + 0.5 * saturation, 0.5 + 0.5 * value)
+    };
+    Picture::display(size, index.iter().map(color).collect())
+}
+
+/// Normals as (n + 1) / 2: x to the right in red, y upwards in green, z towards the viewer in blue.
+pub fn normals(size: Size, normals: &[[f32; 3]]) -> Picture {
+    Picture::display(size, normals.iter().map(|normal| normal.map(|n| (n + 1.0) / 2.0)).collect())
+}
+
+/// A picture with the texels taken from beyond a border tinted: beyond the right one (bit 0) orange,
+/// beyond the bottom one (bit 1) blue.
+pub fn seams(picture: &Picture, beyond: &[u8]) -> Picture {
+    let bytes = picture.bytes();
+    let pixels = bytes
+        .chunks_exact(3)
+        .zip(beyond)
+        .map(|(pixel, &beyond)| {
+            let tint = match beyond & 3 {
+                1 => [1.0, 0.55, 0.1],
+                2 => [0.15, 0.5, 1.0],
+                3 => [0.75, 0.3, 0.9],
+                _ => [0.0; 3],
+            };
+            let share = if beyond == 0 { 0.0 } else { 0.5 };
+            std::array::from_fn(|c| (1.0 - share) * f32::from(pixel[c]) / 255.0 + share * tint[c])
+        })
+        .collect();
+    Picture::display(picture.size, pixels)
+}
+
+/// Differences of two pictures in display values, `gain` times, around mid grey.
+pub fn difference(first: &Picture, second: &Picture, gain: f32) -> Picture {
+    let pixels = first
+        .bytes()
+        .chunks_exact(3)
+        .zip(second.bytes().chunks_exact(3))
+        .map(|(a, b)| std::array::from_fn(|c| 0.5 + gain * (f32::from(b[c]) - f32::from(a[c])) / 255.0))
+        .collect();
+    Picture::display(first.size, pixels)
+}
+
+/// Display RGB of hue, saturation and value, all 0..1.
+fn hsv(hue: f64, saturation: f64, value: f64) -> [f32; 3] {
+    [5.0, 3.0, 1.0].map(|n| {
+        let k = (n + hue * 6.0) % 6.0;
+        (value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)) as f32
+    })
+}

@@ -1,0 +1,223 @@
+//! Pictures: linear values or false colours, written as PNG (display) or EXR (values).
+
+pub mod false_color;
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use crate::color::srgb_encode_u8;
+use crate::error::{Error, Result};
+use crate::shape::{Size, Window};
+use crate::store::mapped::temporary_name;
+
+/// What the values of a picture mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Meaning {
+    /// Linear RGB: a display needs the sRGB curve.
+    Linear,
+    /// Display values 0..1 as they are: false colours.
+    Display,
+}
+
+/// An RGB picture, row 0 at the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Rows and columns.
+    pub size: Size,
+    /// Values, row by row.
+    pub pixels: Vec<[f32; 3]>,
+    /// What they mean.
+    pub meaning: Meaning,
+}
+
+impl Picture {
+    /// A picture of linear values.
+    pub fn linear(size: Size, pixels: Vec<[f32; 3]>) -> Self {
+        Self { size, pixels, meaning: Meaning::Linear }
+    }
+
+    /// A picture of display values.
+    pub fn display(size: Size, pixels: Vec<[f32; 3]>) -> Self {
+        Self { size, pixels, meaning: Meaning::Display }
+    }
+
+    /// 8-bit display values, row by row.
+    pub fn bytes(&self) -> Vec<u8> {
+        let byte = |value: f32| match self.meaning {
+            Meaning::Linear => srgb_encode_u8(f64::from(value)),
+            Meaning::Display => (value.clamp(0.0, 1.0) * 255.0).round() as u8,
+        };
+        self.pixels.iter().flatten().map(|&value| byte(value)).collect()
+    }
+
+    /// The same picture as display values.
+    pub fn as_display(&self) -> Self {
+        let pixels =
+            self.bytes().chunks_exact(3).map(|p| std::array::from_fn(|c| f32::from(p[c]) / 255.0)).collect();
+        Self::display(self.size, pixels)
+    }
+
+    /// All values times `exposure`.
+    #[must_use]
+    pub fn exposed(mut self, exposure: f64) -> Self {
+        self.pixels.iter_mut().flatten().for_each(|value| *value *= exposure as f32);
+        self
+    }
+
+    /// The picture of another size that repeats this one from its top left corner.
+    pub fn repeated(&self, size: Size) -> Self {
+        let pixel = |n: usize| {
+            let (y, x) = (n / size.width % self.size.height, n % size.width % self.size.width);
+            self.pixels[y * self.size.width + x]
+        };
+        Self { size, pixels: (0..size.texels()).map(pixel).collect(), meaning: self.meaning }
+    }
+
+    /// A part of it.
+    pub fn part(&self, window: Window) -> Self {
+        let rows = self.pixels.chunks_exact(self.size.width).skip(window.y).take(window.size.height);
+        let pixels = rows.flat_map(|row| &row[window.x..window.x + window.size.width]).copied().collect();
+        Self { size: window.size, pixels, meaning: self.meaning }
+    }
+
+    /// Each pixel as a square of `factor` pixels.
+    pub fn magnified(&self, factor: usize) -> Self {
+        let size = Size::new(self.size.height * factor, self.size.width * factor);
+        let pixel =
+            |n: usize| self.pixels[n / size.width / factor * self.size.width + n % size.width / factor];
+        Self { size, pixels: (0..size.texels()).map(pixel).collect(), meaning: self.meaning }
+    }
+
+    /// Pictures of one height and meaning side by side with a white gap between.
+    pub fn side_by_side(pictures: &[Self], gap: usize) -> Self {
+        let height = pictures.iter().map(|picture| picture.size.height).min().unwrap_or(0);
+        let width =
+            pictures.iter().map(|picture| picture.size.width + gap).sum::<usize>().saturating_sub(gap);
+        let mut pixels = Vec::with_capacity(height * width);
+        for y in 0..height {
+            for (number, picture) in pictures.iter().enumerate() {
+                if number > 0 {
+                    pixels.extend(std::iter::repeat_n([1.0; 3], gap));
+                }
+                pixels
+                    .extend_from_slice(&picture.pixels[y * picture.size.width..(y + 1) * picture.size.width]);
+            }
+        }
+        let meaning = pictures.first().map_or(Meaning::Display, |picture| picture.meaning);
+        Self { size: Size::new(height, width), pixels, meaning }
+    }
+
+    /// The bytes of a PNG file.
+    pub fn png(&self) -> Result<Vec<u8>> {
+        let failed = |error: png::EncodingError| Error::internal(format!("cannot encode a PNG: {error}"));
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size.width as u32, self.size.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header().map_err(failed)?;
+        writer.write_image_data(&self.bytes()).map_err(failed)?;
+        writer.finish().map_err(failed)?;
+        Ok(bytes)
+    }
+
+    /// The bytes of an EXR file: the values as 32-bit floats.
+    pub fn exr(&self) -> Result<Vec<u8>> {
+        use exr::prelude::{SpecificChannels, WritableImage};
+        let width = self.size.width;
+        let channels = SpecificChannels::rgb(|place: exr::math::Vec2<usize>| {
+            let [r, g, b] = self.pixels[place.y() * width + place.x()];
+            (r, g, b)
+        });
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        exr::image::Image::from_channels((width, self.size.height), channels)
+            .write()
+            .non_parallel()
+            .to_buffered(&mut bytes)
+            .map_err(|error| Error::internal(format!("cannot encode an EXR: {error}")))?;
+        Ok(bytes.into_inner())
+    }
+
+    /// Writes a PNG or an EXR file, by the ending of its name; it appears whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        let bytes = match ending.as_deref() {
+            Some("png") => self.png()?,
+            Some("exr") => self.exr()?,
+            _ => {
+                return Err(Error::usage(format!(
+                    "{}: expected a name that ends in .png (for displays) or .exr (linear values)",
+                    path.display()
+                )));
+            }
+        };
+        write_file(path, &bytes)
+    }
+}
+
+/// Writes a file so that it appears whole or not at all.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |error| Error::io("write", path, error);
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let temporary = temporary_name(path);
+    let written = std::fs::File::create(&temporary).and_then(|file| {
+        let mut file = BufWriter::new(file);
+        file.write_all(bytes)?;
+        file.flush()
+    });
+    written.and_then(|()| std::fs::rename(&temporary, path)).map_err(|error| {
+        let _ = std::fs::remove_file(&temporary);
+        failed(error)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn picture() -> Picture {
+        Picture::linear(Size::new(2, 3), (0..6).map(|n| [n as f32 / 5.0, 0.25, 1.5]).collect())
+    }
+
+    #[test]
+    fn an_exr_holds_the_values_themselves() {
+        let bytes = picture().exr().unwrap();
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size, _| {
+                    Picture::linear(Size::new(size.height(), size.width()), vec![[0.0; 3]; size.area()])
+                },
+                |picture, place, (r, g, b): (f32, f32, f32)| {
+                    picture.pixels[place.y() * picture.size.width + place.x()] = [r, g, b];
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(std::io::Cursor::new(bytes))
+            .unwrap();
+        assert_eq!(image.layer_data.channel_data.pixels, picture());
+    }
+
+    #[test]
+    fn a_png_holds_display_values() {
+        let bytes = picture().png().unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut samples = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut samples).unwrap();
+        assert_eq!(samples, picture().bytes());
+        assert_eq!(&samples[..3], [0, 137, 255]);
+    }
+
+    #[test]
+    fn repetition_and_parts_take_the_right_pixels() {
+        let repeated = picture().repeated(Size::new(5, 7));
+        assert_eq!(repeated.pixels[3 * 7 + 4], picture().pixels[3 + 1]);
+        let part = repeated.part(Window { y: 2, x: 3, size: Size::new(2, 3) });
+        assert_eq!(part, picture());
+    }
+}

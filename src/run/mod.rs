@@ -1,0 +1,39 @@
+//! What makes long work survive: units that are done or not, recipes that tell results apart,
+//! progress, and stopping on request.
+
+pub mod progress;
+pub mod recipe;
+pub mod units;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::error::{Error, Result};
+use progress::Progress;
+
+/// What every stage is given besides its options.
+pub struct Context<'a> {
+    /// Told how far the work is.
+    pub progress: &'a dyn Progress,
+    /// Set from outside to stop the work at the next unit.
+    pub stop: &'a AtomicBool,
+    /// Threads that the work may use.
+    pub threads: usize,
+    /// Resident memory that the work may use.
+    pub memory_bytes: u64,
+}
+
+impl Context<'_> {
+    /// An error of kind `Stopped` once a stop has been asked for.
+    pub fn check_stop(&self) -> Result<()> {
+        if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
+    }
+
+    /// Runs `work` on a pool of [`Context::threads`] threads.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.max(1))
+            .build()
+            .map_err(|error| Error::internal(format!("cannot start {} threads: {error}", self.threads)))?;
+        Ok(pool.install(work))
+    }
+}

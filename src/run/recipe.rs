@@ -1,0 +1,85 @@
+//! Recipes: everything that a result depends on, as JSON, and its digest.
+//!
+//! A result in place with the same digest is taken as done or gone on with; one with another
+//! digest is refused, never mixed.
+
+use std::path::Path;
+
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// The digest of a recipe: SHA-256 of its JSON with sorted keys, in hexadecimal.
+pub fn digest(recipe: &Value) -> String {
+    hexadecimal(&Sha256::digest(canonical(recipe).to_string().as_bytes()))
+}
+
+/// SHA-256 of bytes in hexadecimal.
+pub fn digest_bytes(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// The same value with the keys of every object sorted.
+fn canonical(value: &Value) -> Value {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<_> = map.iter().collect();
+            entries.sort_by_key(|(key, _)| key.as_str());
+            Value::Object(entries.into_iter().map(|(key, value)| (key.clone(), canonical(value))).collect())
+        }
+        Value::Array(values) => values.iter().map(canonical).collect(),
+        other => other.clone(),
+    }
+}
+
+/// Checks that what lies at `path` was made by the same recipe: `found` are its attributes.
+///
+/// # Errors
+/// Names the first setting that differs.
+pub fn expect_same(path: &Path, found: &Map<String, Value>, recipe: &Value) -> Result<()> {
+    if found.get("digest").and_then(Value::as_str) == Some(digest(recipe).as_str()) {
+        return Ok(());
+    }
+    let old = found.get("recipe").unwrap_or(&Value::Null);
+    let difference = first_difference(old, recipe, "").unwrap_or_else(|| "by another version".to_owned());
+    Err(Error::recipe(format!("{} was made by another recipe: {difference}", path.display()))
+        .hint("choose another name for the result, or delete the old one"))
+}
+
+fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
+    if let (Value::Object(old), Value::Object(new)) = (old, new) {
+        let mut keys: Vec<&String> = old.keys().chain(new.keys()).collect();
+        keys.sort();
+        let entry = |map: &Map<String, Value>, key: &str| map.get(key).cloned().unwrap_or(Value::Null);
+        return keys
+            .iter()
+            .find_map(|key| first_difference(&entry(old, key), &entry(new, key), &format!("{place}{key} ")));
+    }
+    (old != new).then(|| format!("{place}was {old}, now {new}"))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_digest_does_not_depend_on_the_order_of_keys() {
+        assert_eq!(digest(&json!({"a": 1, "b": [2, 3]})), digest(&json!({"b": [2, 3], "a": 1})));
+        assert_ne!(digest(&json!({"a": 1})), digest(&json!({"a": 2})));
+    }
+
+    #[test]
+    fn another_recipe_is_refused_and_the_setting_named() {
+        let recipe = json!({"clusters": 256, "seed": 1});
+        let attributes = json!({"recipe": {"clusters": 64, "seed": 1}, "digest": digest(&json!({"clusters": 64, "seed": 1}))});
+        let error = expect_same(Path::new("m"), attributes.as_object().unwrap(), &recipe).unwrap_err();
+        assert!(error.to_string().contains("clusters was 64, now 256"), "{error}");
+    }
+}

@@ -1,0 +1,143 @@
+//! Model against measurement: how well the tile is re-made from its index and representatives.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::color::{ciede2000, lab};
+use crate::error::Result;
+use crate::run::progress::Counted;
+use crate::run::{Context, units};
+use crate::stage::cluster::open_measurement_of;
+use crate::store::model::Model;
+
+/// Texels whose colour differences are taken; the other figures count every texel.
+const COLOUR_TEXELS: usize = 1024;
+
+/// What to compare.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The model.
+    pub model: PathBuf,
+    /// The measurement that it was made from.
+    pub measurement: PathBuf,
+}
+
+/// Errors of the re-made tile.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// One entry an elevation of the view, frontal first.
+    pub elevations: Vec<Errors>,
+    /// All views together.
+    pub all: Errors,
+    /// Texels that the mean CIEDE2000 was taken over, under all directions.
+    pub colour_texels: usize,
+}
+
+/// Mean errors over a set of views, all lights.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Errors {
+    /// Angle of the views from the normal, degrees; absent for all views.
+    pub view_theta_deg: Option<f64>,
+    /// Number of views.
+    pub views: usize,
+    /// Mean |dL*|.
+    pub lightness: f64,
+    /// Peak signal to noise ratio of the stored samples, dB (infinite where they are equal).
+    pub psnr_db: f64,
+    /// Mean CIEDE2000.
+    pub ciede2000: f64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    views: usize,
+    codes: u64,
+    code_count: u64,
+    squares: u64,
+    sample_count: u64,
+    colour: f64,
+    colour_count: u64,
+}
+
+impl Sums {
+    fn add(self, other: Self) -> Self {
+        Self {
+            views: self.views + other.views,
+            codes: self.codes + other.codes,
+            code_count: self.code_count + other.code_count,
+            squares: self.squares + other.squares,
+            sample_count: self.sample_count + other.sample_count,
+            colour: self.colour + other.colour,
+            colour_count: self.colour_count + other.colour_count,
+        }
+    }
+
+    fn errors(self, view_theta_deg: Option<f64>) -> Errors {
+        let mean_square = self.squares as f64 / self.sample_count.max(1) as f64;
+        Errors {
+            view_theta_deg,
+            views: self.views,
+            lightness: self.codes as f64 / self.code_count.max(1) as f64 / 2.55,
+            psnr_db: 10.0 * (255.0 * 255.0 / mean_square).log10(),
+            ciede2000: self.colour / self.colour_count.max(1) as f64,
+        }
+    }
+}
+
+/// Re-makes the tile under every pair of directions and compares it with the measurement.
+pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
+    let model = Model::open(&options.model)?;
+    let measurement = open_measurement_of(&model, &options.measurement)?;
+    let description = measurement.description();
+    let (tile, index, representatives) = (model.tile()?, model.index()?, model.representatives()?);
+    let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
+    let (lights, channels) = (description.lights.len(), description.channels);
+    let texel_bytes = lights * channels;
+    let linear = description.transfer.table();
+    let codes = crate::color::LightnessCodes::new(description.transfer, channels, 1.0);
+    let stride = offsets.len().div_ceil(COLOUR_TEXELS);
+    let colour =
+        |sample: &[u8]| lab(std::array::from_fn(|c| linear[usize::from(sample[c.min(channels - 1)])]));
+
+    let views: Vec<usize> = (0..description.views.len()).collect();
+    context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
+    let sums = units::for_each(context, &views, context.threads, |&view| {
+        let window = measurement.read_reflectance(view, bounds)?;
+        let mut sums = Sums { views: 1, ..Sums::default() };
+        for (texel, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
+            let measured = &window[at * texel_bytes..(at + 1) * texel_bytes];
+            let start = (usize::from(cluster) * description.views.len() + view) * texel_bytes;
+            let modelled = &representatives.samples[start..start + texel_bytes];
+            for (a, b) in measured.chunks_exact(channels).zip(modelled.chunks_exact(channels)) {
+                sums.codes += u64::from(codes.code(a).0.abs_diff(codes.code(b).0));
+                sums.squares += a.iter().zip(b).map(|(&a, &b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>();
+                if texel % stride == 0 {
+                    sums.colour += ciede2000(colour(a), colour(b));
+                    sums.colour_count += 1;
+                }
+            }
+            sums.code_count += lights as u64;
+            sums.sample_count += texel_bytes as u64;
+        }
+        context.progress.advance(1);
+        Ok(sums)
+    })?;
+    context.progress.end();
+
+    let mut elevations: Vec<(f64, Sums)> = Vec::new();
+    let mut order = views;
+    order.sort_by(|&a, &b| description.views[a].theta_rad.total_cmp(&description.views[b].theta_rad));
+    for view in order {
+        let theta = (description.views[view].degrees().0 * 1e6).round() / 1e6;
+        match elevations.last_mut() {
+            Some((last, group)) if *last == theta => *group = group.add(sums[view]),
+            _ => elevations.push((theta, sums[view])),
+        }
+    }
+    Ok(Report {
+        elevations: elevations.iter().map(|&(theta, sums)| sums.errors(Some(theta))).collect(),
+        all: sums.into_iter().fold(Sums::default(), Sums::add).errors(None),
+        colour_texels: offsets.len().div_ceil(stride),
+    })
+}

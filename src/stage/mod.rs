@@ -1,0 +1,11 @@
+//! The steps of the work, one module a command: options, then a plan, then a run.
+
+pub mod cluster;
+pub mod compare;
+pub mod enlarge;
+pub mod fit;
+pub mod image;
+pub mod import;
+pub mod normals;
+pub mod sample;
+pub mod tile;

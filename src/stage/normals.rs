@@ -1,0 +1,142 @@
+//! Tile to normal map: photometric stereo over all lights of the view nearest to the normal.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::color::luminance;
+use crate::error::Result;
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::shape::{Size, Window};
+use crate::stage::cluster::open_measurement_of;
+use crate::store::measurement::Measurement;
+use crate::store::model::{Model, Stage};
+use crate::texel::stereo::Stereo;
+
+/// Rows of the measurement read at a time: a row of chunks.
+const BAND_ROWS: usize = 16;
+
+/// How to estimate normals.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The measurement that the tile was cut from.
+    pub measurement: PathBuf,
+    /// The model with the tile.
+    pub model: PathBuf,
+    /// Leave out the lights that fit worst.
+    pub robust: bool,
+}
+
+/// How it went.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Number of the view that was used.
+    pub view: usize,
+    /// Number of lights.
+    pub lights: usize,
+    /// Mean of the normals.
+    pub mean: [f64; 3],
+    /// Root mean square angle between a normal and the mean normal, degrees.
+    pub spread_deg: f64,
+}
+
+/// An estimation, ready to run.
+pub struct Plan {
+    measurement: Measurement,
+    model: Model,
+    robust: bool,
+    recipe: Value,
+}
+
+/// Checks that the model has a tile of this measurement.
+pub fn plan(options: &Options) -> Result<Plan> {
+    let model = Model::open(&options.model)?;
+    let tile = model.stage_digest(Stage::Tile)?;
+    let measurement = open_measurement_of(&model, &options.measurement)?;
+    let recipe = json!({"stage": "normals", "tile": tile, "robust": options.robust});
+    Ok(Plan { measurement, model, robust: options.robust, recipe })
+}
+
+impl Plan {
+    /// What would be done.
+    pub fn summary(&self) -> Value {
+        json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
+    }
+
+    /// Estimates the normal map, unless that is done.
+    pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        if self.model.is_done(Stage::Normals, &self.recipe)? {
+            return self.model.report(Stage::Normals);
+        }
+        let description = self.measurement.description();
+        let view = frontal_view(&self.measurement);
+        let tile = self.model.tile()?;
+        let stereo = Stereo::new(&description.lights)?;
+        let plane = self.normals_of_window(&stereo, view, tile.bounds(), context)?;
+        let normals: Vec<[f32; 3]> = tile.offsets_in_bounds().into_iter().map(|at| plane[at]).collect();
+        self.model.write_normals(tile.size, &normals)?;
+        let report = report(view, description.lights.len(), &normals);
+        self.model.finish(Stage::Normals, &self.recipe, &report)?;
+        Ok(report)
+    }
+
+    /// Normals of a window of the measurement, band by band.
+    fn normals_of_window(
+        &self,
+        stereo: &Stereo,
+        view: usize,
+        window: Window,
+        context: &Context<'_>,
+    ) -> Result<Vec<[f32; 3]>> {
+        let description = self.measurement.description();
+        let (lights, channels) = (description.lights.len(), description.channels);
+        let linear = description.transfer.table();
+        let normal = |texel: &[u8]| {
+            let intensities: Vec<f64> = texel
+                .chunks_exact(channels)
+                .map(|sample| {
+                    let mut values = [0.0; 3];
+                    values.iter_mut().zip(sample).for_each(|(value, &s)| *value = linear[usize::from(s)]);
+                    luminance(&values[..channels])
+                })
+                .collect();
+            if self.robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
+        };
+        let mut normals = Vec::with_capacity(window.size.texels());
+        context.progress.begin("normals", window.size.height as u64, Counted::Items("rows"));
+        for top in (0..window.size.height).step_by(BAND_ROWS) {
+            context.check_stop()?;
+            let rows = BAND_ROWS.min(window.size.height - top);
+            let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
+            let samples = self.measurement.read_reflectance(view, band)?;
+            let band: Vec<[f32; 3]> =
+                context.install(|| samples.par_chunks_exact(lights * channels).map(normal).collect())?;
+            normals.extend(band);
+            context.progress.advance(rows as u64);
+        }
+        context.progress.end();
+        Ok(normals)
+    }
+}
+
+/// The view nearest to the surface normal, the first of equals.
+pub(crate) fn frontal_view(measurement: &Measurement) -> usize {
+    let views = &measurement.description().views;
+    (0..views.len()).min_by(|&a, &b| views[a].theta_rad.total_cmp(&views[b].theta_rad)).unwrap_or(0)
+}
+
+fn report(view: usize, lights: usize, normals: &[[f32; 3]]) -> Report {
+    let count = normals.len().max(1) as f64;
+    let mean: [f64; 3] =
+        std::array::from_fn(|axis| normals.iter().map(|n| f64::from(n[axis])).sum::<f64>() / count);
+    let length = mean.iter().map(|m| m * m).sum::<f64>().sqrt();
+    let squared = |normal: &[f32; 3]| {
+        let cosine: f64 = normal.iter().zip(mean).map(|(&n, m)| f64::from(n) * m / length).sum();
+        cosine.clamp(-1.0, 1.0).acos().to_degrees().powi(2)
+    };
+    let spread_deg = (normals.iter().map(squared).sum::<f64>() / count).sqrt();
+    Report { view, lights, mean, spread_deg }
+}

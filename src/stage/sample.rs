@@ -1,0 +1,124 @@
+//! A synthetic measurement in UBO2003's layout, so that everything after it starts from an archive.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::PathBuf;
+
+use btfkit_formats::jpeg::{EncodeOptions, encode};
+use btfkit_formats::ubo2003::{Angles, directions_81, write_name};
+use btfkit_formats::zip::ZipWriter;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::sample::{Kind, Scene, Surface};
+use crate::shape::Size;
+use crate::store::mapped::temporary_name;
+
+/// What to make.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The zip to write.
+    pub archive: PathBuf,
+    /// Which material.
+    pub kind: Kind,
+    /// Rows and columns of its images.
+    pub size: Size,
+    /// Number of view directions; 81 are UBO2003's.
+    pub views: usize,
+    /// Number of light directions.
+    pub lights: usize,
+    /// Seed of the material.
+    pub seed: u64,
+    /// Size of its features relative to the default.
+    pub scale: f64,
+}
+
+/// What was made.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Number of images.
+    pub images: usize,
+    /// Bytes of the archive.
+    pub bytes: u64,
+}
+
+/// Directions on UBO2003's rings: its own list for 81, else the pole and as many a ring as its
+/// circumference asks for, at whole degrees as the names demand.
+pub fn directions(count: usize) -> Result<Vec<Angles>> {
+    const RINGS_DEG: [f64; 5] = [15.0, 30.0, 45.0, 60.0, 75.0];
+    const MOST: usize = 600;
+    if count == 81 {
+        return Ok(directions_81());
+    }
+    if !(1..=MOST).contains(&count) {
+        return Err(Error::usage(format!("{count} directions were asked for, expected 1 to {MOST}")));
+    }
+    let total: f64 = RINGS_DEG.iter().map(|theta| theta.to_radians().sin()).sum();
+    let mut angles = vec![(0.0, 0.0)];
+    let (mut asked, mut given) = (0.0, 0);
+    for theta in RINGS_DEG {
+        asked += theta.to_radians().sin() / total * (count - 1) as f64;
+        let ring = asked.round() as usize - given;
+        given += ring;
+        angles.extend((0..ring).map(|k| (theta, (360.0 * k as f64 / ring as f64).round())));
+    }
+    angles
+        .into_iter()
+        .map(|(theta, phi)| Angles::new(theta, phi).ok_or_else(|| Error::internal("an angle out of range")))
+        .collect()
+}
+
+/// Renders the material and writes the archive; it appears whole or not at all.
+pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
+    let (views, lights) = (directions(options.views)?, directions(options.lights)?);
+    let radians = |angles: &Angles| [angles.theta_deg().to_radians(), angles.phi_deg().to_radians()];
+    let Size { height, width } = options.size;
+    let surface = Surface::new(options.kind, width, height, options.scale, options.seed)?;
+    let light_angles: Vec<[f64; 2]> = lights.iter().map(radians).collect();
+    context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));
+    let scene = context.install(|| Scene::new(surface, &light_angles))?;
+
+    let temporary = temporary_name(&options.archive);
+    let failed = |error| Error::io("write", &options.archive, error);
+    if let Some(folder) = options.archive.parent() {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let written = File::create(&temporary).map_err(failed).and_then(|file| {
+        let mut zip = ZipWriter::new(BufWriter::new(file));
+        for (number, view) in views.iter().enumerate() {
+            context.check_stop()?;
+            let images = context.install(|| {
+                let points = scene.view(number as u32, radians(view));
+                (0..lights.len())
+                    .into_par_iter()
+                    .map(|light| {
+                        let samples = points.image(light).ok_or_else(|| Error::internal("no such light"))?;
+                        let bytes =
+                            encode(&samples, width as u32, height as u32, 3, &EncodeOptions::UBO2003)?;
+                        context.progress.advance(1);
+                        Ok(bytes)
+                    })
+                    .collect::<Result<Vec<Vec<u8>>>>()
+            })??;
+            for (light, bytes) in images.iter().enumerate() {
+                let name = write_name(light as u32, lights[light], number as u32, *view, views.len() as u32)?;
+                zip.write_entry(&name, bytes)
+                    .map_err(|error| Error::from(error).context(options.archive.display()))?;
+            }
+        }
+        let mut file = zip.finish().map_err(|error| Error::from(error).context(options.archive.display()))?;
+        file.flush().map_err(failed)?;
+        file.get_ref().sync_all().map_err(failed)
+    });
+    written.and_then(|()| std::fs::rename(&temporary, &options.archive).map_err(failed)).inspect_err(
+        |_| {
+            let _ = std::fs::remove_file(&temporary);
+        },
+    )?;
+    context.progress.end();
+    let bytes = std::fs::metadata(&options.archive).map_err(failed)?.len();
+    Ok(Report { images: views.len() * lights.len(), bytes })
+}

@@ -1,0 +1,309 @@
+//! Where the bytes of a store lie: reads are slices of a memory map, writes are whole or not at all.
+//!
+//! zarrs' own file store writes in place, so a kill leaves a torn shard that a later run takes for
+//! done. Here a write goes to a temporary name, is synced, renamed over the final name, and the
+//! directory is synced: a key holds all of a value or does not exist.
+
+use std::collections::hash_map::RandomState;
+use std::fs::{self, File};
+use std::hash::BuildHasher;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime};
+
+use bytes::Bytes;
+use zarrs_storage::byte_range::{ByteRange, ByteRangeIterator};
+use zarrs_storage::{
+    ListableStorageTraits, MaybeBytesIterator, OffsetBytesIterator, ReadableStorageTraits, StorageError,
+    StoreKey, StoreKeys, StoreKeysPrefixes, StorePrefix, WritableStorageTraits,
+};
+
+use crate::error::{Error, Result};
+
+/// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`.
+const TEMPORARY: &str = ".tmp-";
+
+/// Age after which a temporary file of another host counts as abandoned.
+const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
+
+/// A directory tree as a Zarr storage.
+#[derive(Debug)]
+pub struct MappedStorage {
+    root: PathBuf,
+}
+
+impl MappedStorage {
+    /// The storage under `root`, which need not exist yet.
+    pub fn new(root: &Path) -> Self {
+        Self { root: root.to_owned() }
+    }
+
+    /// The file that a key lies in.
+    pub fn path(&self, key: &StoreKey) -> PathBuf {
+        self.root.join(key.as_str())
+    }
+
+    /// Removes what killed writers left behind: temporary files of dead processes of this host,
+    /// and those of other hosts older than a day.
+    pub fn sweep(&self) -> Result<()> {
+        let mut folders = vec![self.root.clone()];
+        while let Some(folder) = folders.pop() {
+            let entries = match fs::read_dir(&folder) {
+                Ok(entries) => entries,
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error) => return Err(Error::io("list", &folder, error)),
+            };
+            for entry in entries {
+                let entry = entry.map_err(|error| Error::io("list", &folder, error))?;
+                let path = entry.path();
+                if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                    folders.push(path);
+                } else if is_abandoned(&path) {
+                    // Another process may sweep the same file at the same time.
+                    let _ = fs::remove_file(&path);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes `bytes` to `path` so that it appears whole or not at all.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let temporary = temporary_name(path);
+    let written = File::create_new(&temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    if let Err(error) = written.and_then(|()| fs::rename(&temporary, path)) {
+        let _ = fs::remove_file(&temporary);
+        return Err(error);
+    }
+    File::open(folder)?.sync_all()
+}
+
+/// The temporary name beside `path`: process ids repeat across hosts, so it bears host, pid and random bits.
+pub(crate) fn temporary_name(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let random = RandomState::new().hash_one(std::thread::current().id()) as u32;
+    path.with_file_name(format!(".{name}{TEMPORARY}{}-{}-{random:08x}", host(), std::process::id()))
+}
+
+fn host() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let name: String = name.trim().chars().filter(char::is_ascii_alphanumeric).collect();
+    if name.is_empty() { "host".to_owned() } else { name }
+}
+
+fn is_abandoned(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some((_, owner)) = name.rsplit_once(TEMPORARY) else { return false };
+    let mut parts = owner.split('-');
+    let (owner_host, pid) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
+    let dead = owner_host == host()
+        && pid != std::process::id().to_string()
+        && !Path::new("/proc").join(pid).exists();
+    let old = fs::metadata(path)
+        .and_then(|data| data.modified())
+        .is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age > ABANDONED_AFTER));
+    dead || old
+}
+
+/// Maps a file for reading.
+///
+/// # Errors
+/// Those of opening and mapping.
+#[allow(unsafe_code)]
+pub fn map_file(path: &Path) -> io::Result<Bytes> {
+    let file = File::open(path)?;
+    if file.metadata()?.len() == 0 {
+        return Ok(Bytes::new());
+    }
+    // SAFETY: the map is only read. A file that another process truncates while it is mapped can end
+    // this process by SIGBUS; stores are replaced by rename and never truncated, and an archive that
+    // is cut short during its own import is beyond saving.
+    let map = unsafe { memmap2::Mmap::map(&file)? };
+    Ok(Bytes::from_owner(map))
+}
+
+fn storage_error(path: &Path, action: &str, error: &io::Error) -> StorageError {
+    let described = io::Error::new(error.kind(), format!("cannot {action} {}: {error}", path.display()));
+    StorageError::IOError(Arc::new(described))
+}
+
+impl ReadableStorageTraits for MappedStorage {
+    fn get_partial_many<'a>(
+        &'a self,
+        key: &StoreKey,
+        byte_ranges: ByteRangeIterator<'a>,
+    ) -> std::result::Result<MaybeBytesIterator<'a>, StorageError> {
+        let path = self.path(key);
+        let bytes = match map_file(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(storage_error(&path, "read", &error)),
+        };
+        Ok(Some(Box::new(byte_ranges.map(move |range| slice(&bytes, range)))))
+    }
+
+    fn size_key(&self, key: &StoreKey) -> std::result::Result<Option<u64>, StorageError> {
+        let path = self.path(key);
+        match fs::metadata(&path) {
+            Ok(data) => Ok(Some(data.len())),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(storage_error(&path, "read", &error)),
+        }
+    }
+
+    fn supports_get_partial(&self) -> bool {
+        true
+    }
+}
+
+/// The bytes of a range, or an error where the file is shorter than the range.
+fn slice(bytes: &Bytes, range: ByteRange) -> std::result::Result<Bytes, StorageError> {
+    let length = bytes.len() as u64;
+    let bounds = match range {
+        ByteRange::FromStart(offset, None) => Some((offset, length)),
+        ByteRange::FromStart(offset, Some(count)) => offset.checked_add(count).map(|end| (offset, end)),
+        ByteRange::Suffix(count) => length.checked_sub(count).map(|start| (start, length)),
+    };
+    match bounds {
+        Some((start, end)) if start <= end && end <= length => Ok(bytes.slice(start as usize..end as usize)),
+        _ => Err(StorageError::Other(format!("got a file of {length} bytes, expected it to hold {range}"))),
+    }
+}
+
+impl WritableStorageTraits for MappedStorage {
+    fn set(&self, key: &StoreKey, value: Bytes) -> std::result::Result<(), StorageError> {
+        let path = self.path(key);
+        write_atomically(&path, &value).map_err(|error| storage_error(&path, "write", &error))
+    }
+
+    fn set_partial_many(
+        &self,
+        _: &StoreKey,
+        _: OffsetBytesIterator<'_>,
+    ) -> std::result::Result<(), StorageError> {
+        Err(StorageError::Unsupported("this storage writes whole values only".to_owned()))
+    }
+
+    fn erase(&self, key: &StoreKey) -> std::result::Result<(), StorageError> {
+        let path = self.path(key);
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(storage_error(&path, "remove", &error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn erase_prefix(&self, prefix: &StorePrefix) -> std::result::Result<(), StorageError> {
+        let path = self.root.join(prefix.as_str());
+        match fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(storage_error(&path, "remove", &error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn supports_set_partial(&self) -> bool {
+        false
+    }
+}
+
+impl ListableStorageTraits for MappedStorage {
+    fn list(&self) -> std::result::Result<StoreKeys, StorageError> {
+        self.list_prefix(&StorePrefix::root())
+    }
+
+    fn list_prefix(&self, prefix: &StorePrefix) -> std::result::Result<StoreKeys, StorageError> {
+        let mut keys = Vec::new();
+        let mut prefixes = vec![prefix.clone()];
+        while let Some(prefix) = prefixes.pop() {
+            let found = self.list_dir(&prefix)?;
+            keys.extend_from_slice(found.keys());
+            prefixes.extend_from_slice(found.prefixes());
+        }
+        keys.sort();
+        Ok(keys)
+    }
+
+    fn list_dir(&self, prefix: &StorePrefix) -> std::result::Result<StoreKeysPrefixes, StorageError> {
+        let folder = self.root.join(prefix.as_str());
+        let (mut keys, mut prefixes) = (StoreKeys::new(), Vec::new());
+        let entries = match fs::read_dir(&folder) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                return Ok(StoreKeysPrefixes::new(keys, prefixes));
+            }
+            Err(error) => return Err(storage_error(&folder, "list", &error)),
+        };
+        for entry in entries {
+            let entry = entry.map_err(|error| storage_error(&folder, "list", &error))?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name.contains(TEMPORARY) {
+                continue;
+            }
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                prefixes.push(StorePrefix::new(format!("{}{name}/", prefix.as_str()))?);
+            } else {
+                keys.push(StoreKey::new(format!("{}{name}", prefix.as_str()))?);
+            }
+        }
+        keys.sort();
+        prefixes.sort();
+        Ok(StoreKeysPrefixes::new(keys, prefixes))
+    }
+
+    fn size_prefix(&self, prefix: &StorePrefix) -> std::result::Result<u64, StorageError> {
+        let keys = self.list_prefix(prefix)?;
+        keys.iter().map(|key| Ok(self.size_key(key)?.unwrap_or(0))).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_value_appears_whole_and_leaves_no_temporary_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let storage = MappedStorage::new(folder.path());
+        let key = StoreKey::new("a/b/c").unwrap();
+        storage.set(&key, Bytes::from_static(b"twelve bytes")).unwrap();
+        assert_eq!(storage.get(&key).unwrap().unwrap(), "twelve bytes");
+        assert_eq!(storage.get_partial(&key, ByteRange::Suffix(5)).unwrap().unwrap(), "bytes");
+        assert_eq!(fs::read_dir(folder.path().join("a/b")).unwrap().count(), 1);
+        assert_eq!(storage.list().unwrap(), [key]);
+    }
+
+    #[test]
+    fn a_range_beyond_the_file_is_an_error_and_a_missing_key_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let storage = MappedStorage::new(folder.path());
+        let key = StoreKey::new("short").unwrap();
+        assert!(storage.get(&key).unwrap().is_none());
+        storage.set(&key, Bytes::from_static(b"abc")).unwrap();
+        assert!(storage.get_partial(&key, ByteRange::FromStart(1, Some(3))).is_err());
+        assert!(storage.get_partial(&key, ByteRange::Suffix(4)).is_err());
+    }
+
+    #[test]
+    fn the_sweep_takes_leftovers_of_dead_processes_and_spares_the_living() {
+        let folder = tempfile::tempdir().unwrap();
+        let dead = folder.path().join(format!(".zarr.json{TEMPORARY}{}-999999999-0a", host()));
+        let elsewhere = folder.path().join(format!(".zarr.json{TEMPORARY}elsewhere-1-0b"));
+        let mine = temporary_name(&folder.path().join("zarr.json"));
+        for path in [&dead, &elsewhere, &mine] {
+            fs::write(path, b"").unwrap();
+        }
+        MappedStorage::new(folder.path()).sweep().unwrap();
+        assert!(!dead.exists() && elsewhere.exists() && mine.exists());
+    }
+}

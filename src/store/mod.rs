@@ -1,0 +1,302 @@
+//! What lies on disk: Zarr v3 groups of arrays with attributes of ours (see `docs/design.md`, section 3).
+//!
+//! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
+
+pub mod enlarged;
+pub mod mapped;
+pub mod measurement;
+pub mod model;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde_json::{Map, Value, json};
+use zarrs::array::codec::{Crc32cCodec, ShardingCodecOptions, SubchunkWriteOrder, ZstdCodec};
+use zarrs::array::{
+    ArrayBuilder, ArrayMetadataOptions, ArraySubset, CodecOptions, CodecSpecificOptions, DataType, Element,
+    ElementOwned, FillValue, data_type,
+};
+
+use crate::error::{Error, Kind, Result};
+use mapped::MappedStorage;
+
+/// Version of the layout on disk, attribute `btfkit.format`.
+pub const FORMAT: u64 = 1;
+
+/// Level of the zstd codec: after level 1 measured data hardly packs better, only slower.
+const ZSTD_LEVEL: i32 = 1;
+
+/// Largest number of bytes that a small array is read or written with at once.
+const WHOLE_ARRAY_LIMIT_BYTES: u64 = 1 << 34;
+
+/// A Zarr array of a [`Store`].
+pub type Array = zarrs::array::Array<MappedStorage>;
+
+/// Shape, type and chunking of an array that is to be written.
+pub struct Layout<'a> {
+    /// Extent of each dimension.
+    pub shape: Vec<u64>,
+    /// What is decoded at once.
+    pub chunk: Vec<u64>,
+    /// What is written at once; a chunk of its own file where absent.
+    pub shard: Option<Vec<u64>>,
+    /// Element type.
+    pub data_type: DataType,
+    /// Names of the dimensions.
+    pub names: &'a [&'a str],
+    /// Attributes of the array (units and the like).
+    pub attributes: Map<String, Value>,
+}
+
+impl<'a> Layout<'a> {
+    /// An array of elements of type `T` in as few chunks as keep each below 16 MiB,
+    /// cut along the first dimension only.
+    pub fn small<T: Named>(names: &'a [&'a str], shape: &[usize]) -> Self {
+        const CHUNK_LIMIT_BYTES: u64 = 16 << 20;
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        let slice_bytes = shape.iter().skip(1).product::<u64>().max(1) * size_of::<T>() as u64;
+        let mut chunk: Vec<u64> = shape.iter().map(|&n| n.max(1)).collect();
+        if let Some(first) = chunk.first_mut() {
+            *first = (*first).min((CHUNK_LIMIT_BYTES / slice_bytes).max(1));
+        }
+        Self { shape, chunk, shard: None, data_type: T::data_type(), names, attributes: Map::new() }
+    }
+}
+
+/// Element types that our stores hold.
+pub trait Named: Element + ElementOwned + Default + Copy {
+    /// The Zarr data type.
+    fn data_type() -> DataType;
+}
+
+macro_rules! named {
+    ($($type:ty => $name:ident),*) => {$(
+        impl Named for $type {
+            fn data_type() -> DataType { data_type::$name() }
+        }
+    )*};
+}
+named!(u8 => uint8, u16 => uint16, u32 => uint32, i32 => int32, f32 => float32, f64 => float64);
+
+/// A Zarr v3 group in a directory.
+#[derive(Clone)]
+pub struct Store {
+    path: PathBuf,
+    storage: Arc<MappedStorage>,
+}
+
+impl Store {
+    /// The store at `path`, whether or not there is one yet.
+    pub fn at(path: &Path) -> Self {
+        Self { path: path.to_owned(), storage: Arc::new(MappedStorage::new(path)) }
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Removes what killed writers left.
+    pub fn sweep(&self) -> Result<()> {
+        self.storage.sweep()
+    }
+
+    /// Our attributes (key `btfkit`) of the root group; `None` where there is no store.
+    ///
+    /// # Errors
+    /// Where there is something that is not a store of ours.
+    pub fn attributes(&self) -> Result<Option<Map<String, Value>>> {
+        let file = self.path.join("zarr.json");
+        let text = match std::fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                let occupied = self.path.is_file()
+                    || std::fs::read_dir(&self.path).is_ok_and(|mut entries| entries.next().is_some());
+                let sweepable = std::fs::read_dir(&self.path).is_ok_and(|mut entries| {
+                    entries.all(|e| e.is_ok_and(|e| e.file_name().to_string_lossy().starts_with('.')))
+                });
+                if occupied && !sweepable {
+                    return Err(Error::input(format!(
+                        "{} exists and is not a Zarr store (no zarr.json in it)",
+                        self.path.display()
+                    )));
+                }
+                return Ok(None);
+            }
+            Err(error) => return Err(Error::io("read", &file, error)),
+        };
+        let damaged = |what: String| Error::input(format!("{}: {what}", file.display()));
+        let metadata: Value = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        let ours = metadata.pointer("/attributes/btfkit").and_then(Value::as_object).ok_or_else(|| {
+            damaged("a Zarr group without the attribute btfkit: not a store of this program".into())
+        })?;
+        match ours.get("format").and_then(Value::as_u64) {
+            Some(FORMAT) => Ok(Some(ours.clone())),
+            format => Err(damaged(format!("got layout format {format:?}, expected {FORMAT}"))),
+        }
+    }
+
+    /// The attributes of a store that must exist and be of this kind.
+    pub fn expect(&self, kind: &str) -> Result<Map<String, Value>> {
+        let found = self.attributes()?.ok_or_else(|| {
+            Error::missing(format!("{}: no store here, expected a {kind}", self.path.display()))
+        })?;
+        match found.get("kind").and_then(Value::as_str) {
+            Some(name) if name == kind => Ok(found),
+            name => Err(Error::input(format!(
+                "{}: got a store of kind {}, expected a {kind}",
+                self.path.display(),
+                name.unwrap_or("unknown")
+            ))),
+        }
+    }
+
+    /// Writes the group's metadata with our attributes; `group` is "" for the root.
+    pub fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
+        let mut metadata = json!({"zarr_format": 3, "node_type": "group", "attributes": {}});
+        if !attributes.is_empty() {
+            metadata["attributes"]["btfkit"] = Value::Object(attributes);
+        }
+        let text =
+            serde_json::to_vec_pretty(&metadata).map_err(|error| Error::internal(error.to_string()))?;
+        let file = self.path.join(group).join("zarr.json");
+        mapped::write_atomically(&file, &text).map_err(|error| Error::io("write", &file, error))
+    }
+
+    /// Makes an array ready to be written chunk by chunk; its metadata is written, its data is not touched.
+    pub fn create_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
+        let failed = |error: &dyn std::fmt::Display| Error::internal(format!("array {name}: {error}"));
+        let outer = layout.shard.clone().unwrap_or_else(|| layout.chunk.clone());
+        let zero = FillValue::new(vec![0; layout.data_type.fixed_size().unwrap_or(1)]);
+        let mut builder = ArrayBuilder::new(layout.shape.clone(), outer, layout.data_type.clone(), zero);
+        builder
+            .bytes_to_bytes_codecs(vec![
+                Arc::new(ZstdCodec::new(ZSTD_LEVEL, false)),
+                Arc::new(Crc32cCodec::new()),
+            ])
+            .dimension_names(Some(layout.names.iter().copied()))
+            .attributes(layout.attributes.clone())
+            .codec_specific_options(CodecSpecificOptions::default().with_option(
+                ShardingCodecOptions::default().with_subchunk_write_order(SubchunkWriteOrder::C),
+            ));
+        if layout.shard.is_some() {
+            builder.subchunk_shape(layout.chunk.clone());
+        }
+        let array =
+            builder.build(self.storage.clone(), &format!("/{name}")).map_err(|error| failed(&error))?;
+        array
+            .store_metadata_opt(&ArrayMetadataOptions::default().with_include_zarrs_metadata(false))
+            .map_err(|error| self.write_error(&error.into()))?;
+        Ok(array)
+    }
+
+    /// Opens an array for reading.
+    pub fn open_array(&self, name: &str) -> Result<Array> {
+        if !self.path.join(name).join("zarr.json").exists() {
+            return Err(Error::missing(format!("{}: no array {name} in this store", self.path.display())));
+        }
+        Array::open(self.storage.clone(), &format!("/{name}")).map_err(|error| self.damaged(name, &error))
+    }
+
+    /// Writes a whole array of chunks without shards.
+    pub fn write<T: Named>(&self, name: &str, layout: &Layout<'_>, elements: &[T]) -> Result<()> {
+        let array = self.create_array(name, layout)?;
+        let rows = layout.chunk.first().copied().unwrap_or(1);
+        let total = layout.shape.first().copied().unwrap_or(0);
+        let slice: usize = layout.shape.iter().skip(1).product::<u64>() as usize;
+        for (number, start) in (0..total).step_by(rows.max(1) as usize).enumerate() {
+            let end = (start + rows).min(total);
+            // A chunk at the border is stored whole; what lies beyond the shape is never read.
+            let mut chunk = elements[start as usize * slice..end as usize * slice].to_vec();
+            chunk.resize(rows as usize * slice, T::default());
+            let mut indices = vec![0; layout.shape.len()];
+            indices[0] = number as u64;
+            if slice > 0 {
+                self.write_chunk(&array, &indices, chunk)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Encodes and writes one chunk (or shard) of an array, all-zero ones too.
+    pub fn write_chunk<T: Named>(&self, array: &Array, indices: &[u64], elements: Vec<T>) -> Result<()> {
+        // One thread: a shard's bytes must not depend on which of its chunks was encoded first.
+        let options = CodecOptions::default().with_store_empty_chunks(true).with_concurrent_target(1);
+        array.store_chunk_opt(indices, elements, &options).map_err(|error| self.write_error(&error))
+    }
+
+    /// Whether a chunk (or shard) has been written.
+    pub fn has_chunk(&self, array: &Array, indices: &[u64]) -> bool {
+        self.storage.path(&array.chunk_key(indices)).is_file()
+    }
+
+    /// Reads a box of an array: offset and extent in each dimension.
+    ///
+    /// # Errors
+    /// [`Kind::Missing`] where a shard of it has not been written, [`Kind::Input`] where it is damaged.
+    pub fn read_box<T: Named>(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<T>> {
+        let name = array.path().as_str().trim_start_matches('/').to_owned();
+        let bytes = extent.iter().try_fold(size_of::<T>() as u64, |product, &n| product.checked_mul(n));
+        if bytes.is_none_or(|bytes| bytes > WHOLE_ARRAY_LIMIT_BYTES) {
+            return Err(Error::input(format!(
+                "{}: {name}: a box of {extent:?} elements is too large",
+                self.path.display()
+            )));
+        }
+        if *array.data_type() != T::data_type() {
+            return Err(Error::input(format!(
+                "{}: {name}: got elements of type {}, expected {}",
+                self.path.display(),
+                array.data_type(),
+                T::data_type()
+            )));
+        }
+        let subset = ArraySubset::new_with_start_shape(start.to_vec(), extent.to_vec())
+            .map_err(|error| Error::internal(error.to_string()))?;
+        let chunks = array.chunks_in_array_subset(&subset).map_err(|error| self.damaged(&name, &error))?;
+        if let Some(chunks) = chunks {
+            for indices in &chunks.indices() {
+                if !self.has_chunk(array, &indices) {
+                    return Err(Error::missing(format!(
+                        "{}: {name}: shard {indices:?} has not been written",
+                        self.path.display()
+                    ))
+                    .hint("run the command that makes this store again; it goes on where it stopped"));
+                }
+            }
+        }
+        array
+            .retrieve_array_subset_opt::<Vec<T>>(&subset, &CodecOptions::default())
+            .map_err(|error| self.damaged(&name, &error))
+    }
+
+    /// Reads a whole array whose shape must be `shape` (0 stands for any extent); returns the shape found.
+    pub fn read<T: Named>(&self, name: &str, shape: &[usize]) -> Result<(Vec<usize>, Vec<T>)> {
+        let array = self.open_array(name)?;
+        let found: Vec<usize> = array.shape().iter().map(|&n| n as usize).collect();
+        let fits = found.len() == shape.len() && found.iter().zip(shape).all(|(&f, &s)| s == 0 || f == s);
+        if !fits {
+            return Err(Error::input(format!(
+                "{}: {name}: got shape {found:?}, expected {shape:?} (0 stands for any)",
+                self.path.display()
+            )));
+        }
+        let start = vec![0; found.len()];
+        let elements = self.read_box(&array, &start, array.shape())?;
+        Ok((found, elements))
+    }
+
+    fn damaged(&self, name: &str, error: &dyn std::fmt::Display) -> Error {
+        Error::input(format!("{}: array {name}: {error}", self.path.display())).hint(
+            "the store is damaged: delete what the message names and run the command that made it again",
+        )
+    }
+
+    fn write_error(&self, error: &zarrs::array::ArrayError) -> Error {
+        let mut failed = Error::new(Kind::Io, error.to_string());
+        if error.to_string().contains("No space left") {
+            failed = failed.hint("free some space and run the same command again");
+        }
+        failed
+    }
+}

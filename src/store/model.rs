@@ -1,0 +1,434 @@
+//! The model store: what the analysis of a measurement leaves, everything an evaluator needs.
+//!
+//! Each stage (`tile`, `cluster`, `normals`, `fit`) writes its arrays and then, last, its entry in
+//! the attributes: arrays without their entry are the remains of a run that was killed.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use crate::color::Transfer;
+use crate::error::{Error, Result};
+use crate::mrf::car::Prior;
+use crate::mrf::{Kind as FieldKind, Level, Model as FieldModel};
+use crate::run::recipe;
+use crate::shape::Size;
+use crate::store::measurement::{Description, read_directions, write_directions};
+use crate::store::{FORMAT, Layout, Store};
+use crate::texel::direction::Direction;
+use crate::texel::tile::Tile;
+use crate::texel::triangulation::triangulate;
+
+/// The attribute `kind` of a model store.
+pub const KIND: &str = "model";
+
+/// The stages of an analysis, in the order of the data flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Cut a tile.
+    Tile,
+    /// Cluster its BRDFs.
+    Cluster,
+    /// Estimate its normal map.
+    Normals,
+    /// Fit the random field.
+    Fit,
+}
+
+impl Stage {
+    /// Its name, as a command and as an entry in the attributes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tile => "tile",
+            Self::Cluster => "cluster",
+            Self::Normals => "normals",
+            Self::Fit => "fit",
+        }
+    }
+}
+
+/// A model store.
+pub struct Model {
+    store: Store,
+}
+
+impl Model {
+    /// Opens a model, or begins one where there is none.
+    pub fn create(path: &Path) -> Result<Self> {
+        let store = Store::at(path);
+        if store.attributes()?.is_none() {
+            let value =
+                json!({"kind": KIND, "format": FORMAT, "version": env!("CARGO_PKG_VERSION"), "stages": {}});
+            store.write_group("", value.as_object().cloned().unwrap_or_default())?;
+        }
+        store.expect(KIND)?;
+        store.sweep()?;
+        Ok(Self { store })
+    }
+
+    /// Opens a model for reading.
+    pub fn open(path: &Path) -> Result<Self> {
+        let store = Store::at(path);
+        store.expect(KIND)?;
+        Ok(Self { store })
+    }
+
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        self.store.path()
+    }
+
+    /// The attributes of a stage that is done: `recipe`, `digest` and `report`.
+    pub fn stage(&self, stage: Stage) -> Result<Option<Map<String, Value>>> {
+        let attributes = self.store.expect(KIND)?;
+        let entry = attributes.get("stages").and_then(|stages| stages.get(stage.name()));
+        Ok(entry.and_then(Value::as_object).cloned())
+    }
+
+    /// Digest of a stage that must be done.
+    pub fn stage_digest(&self, stage: Stage) -> Result<String> {
+        let entry = self.stage(stage)?.ok_or_else(|| {
+            Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
+                .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
+        })?;
+        Ok(entry.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned())
+    }
+
+    /// Digest of all that an enlargement depends on.
+    pub fn digest(&self) -> Result<String> {
+        let [cluster, fit] = [self.stage_digest(Stage::Cluster)?, self.stage_digest(Stage::Fit)?];
+        Ok(recipe::digest(&json!({"cluster": cluster, "fit": fit})))
+    }
+
+    /// Whether a stage has been run by this recipe.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self, stage: Stage, recipe: &Value) -> Result<bool> {
+        match self.stage(stage)? {
+            None => Ok(false),
+            Some(entry) => {
+                let place = format!("{} ({})", self.path().display(), stage.name());
+                recipe::expect_same(Path::new(&place), &entry, recipe)?;
+                Ok(true)
+            }
+        }
+    }
+
+    /// Declares a stage done; to be called after its arrays are written.
+    pub fn finish(&self, stage: Stage, recipe: &Value, report: &impl serde::Serialize) -> Result<()> {
+        let mut attributes = self.store.expect(KIND)?;
+        let report = serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))?;
+        let entry = json!({"recipe": recipe, "digest": recipe::digest(recipe), "report": report});
+        if let Some(stages) = attributes.get_mut("stages").and_then(Value::as_object_mut) {
+            stages.insert(stage.name().to_owned(), entry);
+        }
+        self.store.write_group("", attributes)
+    }
+
+    /// The report of a stage that is done.
+    pub fn report<T: serde::de::DeserializeOwned>(&self, stage: Stage) -> Result<T> {
+        self.stage_digest(stage)?;
+        let entry = self.stage(stage)?.unwrap_or_default();
+        serde_json::from_value(entry.get("report").cloned().unwrap_or_default()).map_err(|error| {
+            Error::input(format!("{}: report of {}: {error}", self.path().display(), stage.name()))
+        })
+    }
+
+    /// Writes the directions of the measurement and their triangulations.
+    pub fn write_directions(&self, description: &Description) -> Result<()> {
+        for (dimension, directions) in [("view", &description.views), ("light", &description.lights)] {
+            write_directions(&self.store, &format!("{dimension}_direction"), dimension, directions)?;
+            let triangles = triangulate(directions);
+            let corners: Vec<u16> = triangles.iter().flatten().copied().collect();
+            let layout = Layout::small::<u16>(&["triangle", "corner"], &[triangles.len(), 3]);
+            self.store.write(&format!("{dimension}_triangles"), &layout, &corners)?;
+        }
+        Ok(())
+    }
+
+    /// View directions and light directions.
+    pub fn directions(&self) -> Result<[Vec<Direction>; 2]> {
+        Ok([
+            read_directions(&self.store, "view_direction")?,
+            read_directions(&self.store, "light_direction")?,
+        ])
+    }
+
+    /// Triangles of the views and of the lights: numbers of three directions each.
+    pub fn triangles(&self) -> Result<[Vec<[u16; 3]>; 2]> {
+        let read = |name: &str| -> Result<Vec<[u16; 3]>> {
+            let (_, corners) = self.store.read::<u16>(name, &[0, 3])?;
+            Ok(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect())
+        };
+        Ok([read("view_triangles")?, read("light_triangles")?])
+    }
+
+    /// Writes which measured texel each tile texel is, [y, x, 2].
+    pub fn write_tile(&self, tile: &Tile) -> Result<()> {
+        let coordinates: Vec<u32> = tile.source.iter().flatten().copied().collect();
+        let layout = Layout::small::<u32>(&["y", "x", "row_column"], &[tile.size.height, tile.size.width, 2]);
+        self.store.write("tile_source", &layout, &coordinates)
+    }
+
+    /// The tile.
+    pub fn tile(&self) -> Result<Tile> {
+        let report: Map<String, Value> = self.report(Stage::Tile)?;
+        let wraps = report.get("wraps").and_then(Value::as_bool).unwrap_or(false);
+        let (shape, coordinates) = self.store.read::<u32>("tile_source", &[0, 0, 2])?;
+        let source = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+        Ok(Tile { size: Size::new(shape[0], shape[1]), source, wraps })
+    }
+
+    /// Writes the cluster of each tile texel, u8 or u16 by their number.
+    pub fn write_index(&self, size: Size, index: &[u16], clusters: usize) -> Result<()> {
+        write_index(&self.store, size, index, clusters)
+    }
+
+    /// The cluster of each tile texel.
+    pub fn index(&self) -> Result<Vec<u16>> {
+        let Size { height, width } = self.tile()?.size;
+        let index = match self.store.open_array("index")?.data_type().to_string().as_str() {
+            "uint16" => self.store.read::<u16>("index", &[height, width])?.1,
+            _ => self.store.read::<u8>("index", &[height, width])?.1.into_iter().map(u16::from).collect(),
+        };
+        Ok(index)
+    }
+
+    /// Writes centres [cluster, view, light], u8 L* codes.
+    pub fn write_centres(&self, shape: [usize; 3], centres: &[u8]) -> Result<()> {
+        self.store.write("centres", &Layout::small::<u8>(&["cluster", "view", "light"], &shape), centres)
+    }
+
+    /// Writes representatives [cluster, view, light, channel] and where each was measured.
+    pub fn write_representatives(
+        &self,
+        representatives: &Representatives,
+        texels: &[[u32; 2]],
+    ) -> Result<()> {
+        let names = ["cluster", "view", "light", "channel"];
+        let layout = Layout::small::<u8>(&names, &representatives.shape);
+        self.store.write("representatives", &layout, &representatives.samples)?;
+        let layout = Layout::small::<u32>(&["cluster", "row_column"], &[texels.len(), 2]);
+        self.store.write(
+            "representative_texel",
+            &layout,
+            &texels.iter().flatten().copied().collect::<Vec<_>>(),
+        )
+    }
+
+    /// The measured colour BRDFs that stand for the clusters.
+    pub fn representatives(&self) -> Result<Representatives> {
+        let (shape, samples) = self.store.read::<u8>("representatives", &[0, 0, 0, 0])?;
+        let report: Map<String, Value> = self.report(Stage::Tile)?;
+        let transfer = report.get("transfer").cloned().unwrap_or_default();
+        let transfer: Transfer = serde_json::from_value(transfer)
+            .map_err(|error| Error::input(format!("{}: transfer: {error}", self.path().display())))?;
+        Ok(Representatives { shape: [shape[0], shape[1], shape[2], shape[3]], samples, transfer })
+    }
+
+    /// Writes D of (26), [cluster, cluster], L* units.
+    pub fn write_distance(&self, clusters: usize, distance: &[f32]) -> Result<()> {
+        let mut layout = Layout::small::<f32>(&["cluster", "cluster_other"], &[clusters, clusters]);
+        layout
+            .attributes
+            .insert("units".to_owned(), json!("L*, summed over directions with weight cos(theta_v)"));
+        self.store.write("distance", &layout, distance)
+    }
+
+    /// D of (26), row by row.
+    pub fn distance(&self) -> Result<Vec<f32>> {
+        let (shape, distance) = self.store.read::<f32>("distance", &[0, 0])?;
+        if shape[0] != shape[1] || !distance.iter().all(|d| d.is_finite() && *d >= 0.0) {
+            return Err(Error::input(format!(
+                "{}: distance: expected a square array of numbers >= 0",
+                self.path().display()
+            )));
+        }
+        Ok(distance)
+    }
+
+    /// Writes the normal map [y, x, 3], unit vectors.
+    pub fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
+        write_normals(&self.store, size, normals)
+    }
+
+    /// The normal map.
+    pub fn normals(&self) -> Result<Vec<[f32; 3]>> {
+        let Size { height, width } = self.tile()?.size;
+        let (_, values) = self.store.read::<f32>("normals", &[height, width, 3])?;
+        Ok(values.chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect())
+    }
+
+    /// Writes the random field model under `mrf/`.
+    pub fn write_field(&self, field: &FieldModel) -> Result<()> {
+        self.store.write_group("mrf", Map::new())?;
+        let channels = field.mean.len();
+        self.store.write("mrf/mean", &Layout::small::<f64>(&["channel"], &[channels]), &field.mean)?;
+        if let Some(transform) = &field.transform {
+            let layout = Layout::small::<f64>(&["component", "channel"], &[channels, channels]);
+            self.store.write("mrf/transform", &layout, &rows(transform))?;
+        }
+        for (number, level) in field.levels.iter().enumerate() {
+            let group = format!("mrf/level_{number}");
+            self.store.write_group(&group, Map::new())?;
+            let layout = Layout::small::<f64>(
+                &["channel", "coefficient"],
+                &[level.gamma.nrows(), level.gamma.ncols()],
+            );
+            self.store.write(&format!("{group}/gamma"), &layout, &rows(&level.gamma))?;
+            let layout = match field.kind {
+                FieldKind::Car3d => {
+                    Layout::small::<f64>(&["channel", "channel_other"], &[channels, channels])
+                }
+                FieldKind::Car2d => Layout::small::<f64>(&["channel"], &[channels]),
+            };
+            self.store.write(&format!("{group}/sigma"), &layout, &rows(&level.sigma))?;
+            let sites: Vec<i32> = level.neighbourhood.iter().flatten().copied().collect();
+            let layout = Layout::small::<i32>(&["site", "dy_dx"], &[level.neighbourhood.len(), 2]);
+            self.store.write(&format!("{group}/neighbourhood"), &layout, &sites)?;
+        }
+        Ok(())
+    }
+
+    /// The random field model.
+    pub fn field(&self) -> Result<FieldModel> {
+        let report: FieldReport = self.report(Stage::Fit)?;
+        let (_, mean) = self.store.read::<f64>("mrf/mean", &[0])?;
+        let channels = mean.len();
+        let kind = report.kind();
+        let transform = match kind {
+            FieldKind::Car3d => None,
+            FieldKind::Car2d => {
+                let (_, values) = self.store.read::<f64>("mrf/transform", &[channels, channels])?;
+                Some(DMatrix::from_row_slice(channels, channels, &values))
+            }
+        };
+        let levels = report
+            .levels
+            .iter()
+            .enumerate()
+            .map(|(number, report)| self.level(number, kind, channels, report))
+            .collect::<Result<Vec<Level>>>()?;
+        let field = FieldModel { kind, mean, transform, levels };
+        field.check().map_err(|error| error.context(self.path().display()))?;
+        Ok(field)
+    }
+
+    fn level(&self, number: usize, kind: FieldKind, channels: usize, report: &LevelReport) -> Result<Level> {
+        let group = format!("mrf/level_{number}");
+        let (_, sites) = self.store.read::<i32>(&format!("{group}/neighbourhood"), &[0, 2])?;
+        let neighbourhood: Vec<[i32; 2]> = sites.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
+        let (columns, sigma_shape) = match kind {
+            FieldKind::Car3d => (channels * neighbourhood.len(), vec![channels, channels]),
+            FieldKind::Car2d => (neighbourhood.len(), vec![channels]),
+        };
+        let (_, gamma) = self.store.read::<f64>(&format!("{group}/gamma"), &[channels, columns])?;
+        let (_, sigma) = self.store.read::<f64>(&format!("{group}/sigma"), &sigma_shape)?;
+        Ok(Level {
+            neighbourhood,
+            gamma: DMatrix::from_row_slice(channels, columns, &gamma),
+            sigma: DMatrix::from_row_slice(channels, sigma.len() / channels, &sigma),
+            prior: Prior {
+                xx: report.prior_v_xx,
+                yy: report.prior_v_yy,
+                beta: report.prior_beta,
+                degrees: report.prior_degrees,
+            },
+            log_evidence: report.log_evidence,
+            radius: report.radius,
+            size: report.size,
+            note: report.note.clone(),
+        })
+    }
+}
+
+/// What the attributes of stage `fit` tell of the field, beside its arrays.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FieldReport {
+    /// `3d` or `2d`.
+    pub mrf: String,
+    /// Level 0 is the finest.
+    pub levels: Vec<LevelReport>,
+}
+
+/// One level of a [`FieldReport`].
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LevelReport {
+    /// Height and width of the level that was fitted.
+    pub size: [usize; 2],
+    /// Number of sites of the neighbourhood.
+    pub eta: usize,
+    /// Log evidence of that neighbourhood.
+    pub log_evidence: f64,
+    /// Spectral radius of the recursion; below 1 is stable.
+    pub radius: f64,
+    /// What had to be done to make it stable.
+    pub note: Option<String>,
+    /// Diagonal of V_XX(0).
+    pub prior_v_xx: f64,
+    /// Diagonal of V_YY(0).
+    pub prior_v_yy: f64,
+    /// beta(0).
+    pub prior_beta: f64,
+    /// Degrees of freedom of the inverse Wishart prior, for the evidence.
+    pub prior_degrees: f64,
+}
+
+impl FieldReport {
+    /// The report of a fitted field.
+    pub fn new(field: &FieldModel) -> Self {
+        let level = |level: &Level| LevelReport {
+            size: level.size,
+            eta: level.neighbourhood.len(),
+            log_evidence: level.log_evidence,
+            radius: level.radius,
+            note: level.note.clone(),
+            prior_v_xx: level.prior.xx,
+            prior_v_yy: level.prior.yy,
+            prior_beta: level.prior.beta,
+            prior_degrees: level.prior.degrees,
+        };
+        let mrf = if field.kind == FieldKind::Car2d { "2d" } else { "3d" };
+        Self { mrf: mrf.to_owned(), levels: field.levels.iter().map(level).collect() }
+    }
+
+    fn kind(&self) -> FieldKind {
+        if self.mrf == "2d" { FieldKind::Car2d } else { FieldKind::Car3d }
+    }
+}
+
+/// Measured colour BRDFs, one a cluster.
+pub struct Representatives {
+    /// Clusters, views, lights, channels.
+    pub shape: [usize; 4],
+    /// Samples in that order.
+    pub samples: Vec<u8>,
+    /// Their transfer curve.
+    pub transfer: Transfer,
+}
+
+/// Elements of a matrix row by row.
+fn rows(matrix: &DMatrix<f64>) -> Vec<f64> {
+    matrix.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect()
+}
+
+/// Writes an index [y, x] as u8 or u16 by the number of clusters.
+fn write_index(store: &Store, size: Size, index: &[u16], clusters: usize) -> Result<()> {
+    let shape = [size.height, size.width];
+    if clusters <= 256 {
+        let narrow: Vec<u8> = index.iter().map(|&cluster| cluster as u8).collect();
+        store.write("index", &Layout::small::<u8>(&["y", "x"], &shape), &narrow)
+    } else {
+        store.write("index", &Layout::small::<u16>(&["y", "x"], &shape), index)
+    }
+}
+
+/// Writes unit vectors [y, x, 3] in the sample frame.
+fn write_normals(store: &Store, size: Size, normals: &[[f32; 3]]) -> Result<()> {
+    let mut layout = Layout::small::<f32>(&["y", "x", "xyz"], &[size.height, size.width, 3]);
+    layout.attributes.insert("frame".to_owned(), json!("x right, y up, z out of the surface"));
+    store.write("normals", &layout, &normals.iter().flatten().copied().collect::<Vec<_>>())
+}

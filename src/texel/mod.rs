@@ -1,0 +1,11 @@
+//! Texels and their BRDFs: directions, tiles, clusters, normals, and looking values up.
+
+pub mod cluster;
+pub mod direction;
+pub mod evaluate;
+pub mod nearest;
+pub mod scan;
+pub mod seam;
+pub mod stereo;
+pub mod tile;
+pub mod triangulation;

@@ -1,1 +1,19 @@
+//! Behaviour of the program and the library, on samples that they make themselves.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, unreachable_pub)]
 
+#[path = "behaviour/bad_input.rs"]
+mod bad_input;
+#[path = "behaviour/determinism.rs"]
+mod determinism;
+#[path = "behaviour/equations.rs"]
+mod equations;
+#[path = "behaviour/fixture.rs"]
+mod fixture;
+#[path = "behaviour/interruption.rs"]
+mod interruption;
+#[path = "behaviour/pictures.rs"]
+mod pictures;
+#[path = "behaviour/real_data.rs"]
+mod real_data;
+#[path = "behaviour/recipes.rs"]
+mod recipes;

@@ -1,4 +1,4 @@
-//! Any bytes as a JPEG: no panic, samples only for bytes that earn them, and no image that stays whole when cut.
+//! Any bytes as a JPEG: no panic, samples only for bytes that earn them, no image that stays whole when cut.
 #![no_main]
 
 use btfkit_formats::{Limits, jpeg};

@@ -35,8 +35,8 @@ impl EncodeOptions {
 ///
 /// # Errors
 ///
-/// [`ErrorKind::Argument`]: width or height not in 1..=65535, channels neither 1 nor 3, a quality outside 1..=100,
-/// or a number of samples that does not fit.
+/// [`ErrorKind::Argument`]: width or height not in 1..=65535, channels neither 1 nor 3, a quality outside
+/// 1..=100, or a number of samples that does not fit.
 ///
 /// ```
 /// use btfkit_formats::{Limits, jpeg};

@@ -78,8 +78,8 @@ impl Catalogue {
     ///
     /// # Errors
     ///
-    /// Everything that keeps the set from being complete, at once: all pairs that are missing, all that are there
-    /// twice; or that no name is an image.
+    /// Everything that keeps the set from being complete, at once: all pairs that are missing, all that are
+    /// there twice; or that no name is an image.
     pub fn from_names<'a>(
         names: impl IntoIterator<Item = &'a str>,
     ) -> Result<Catalogue, Box<CatalogueErrors>> {
@@ -127,8 +127,8 @@ impl Catalogue {
         &self.lights
     }
 
-    /// Position, in the list that the catalogue was made from, of the image of view number `view` and light number
-    /// `light`; `None` if there is no such view or light.
+    /// Position, in the list that the catalogue was made from, of the image of view number `view` and light
+    /// number `light`; `None` if there is no such view or light.
     pub fn image(&self, view: usize, light: usize) -> Option<usize> {
         if light >= self.lights.len() {
             return None;

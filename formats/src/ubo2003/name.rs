@@ -17,8 +17,8 @@ pub struct ImageName {
 /// Reads the name of an image, or `None` if it is not one.
 ///
 /// Only what follows the last `/` or `\` counts. It must end in `.jpg` or `.jpeg` and have each of `tl`, `pl`,
-/// `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may be
-/// negative). Case, order, separators, and whatever else the name holds, do not matter.
+/// `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
+/// be negative). Case, order, separators, and whatever else the name holds, do not matter.
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{Angles, parse_name};
@@ -94,8 +94,8 @@ fn number(bytes: &[u8]) -> Option<f64> {
 ///
 /// # Errors
 ///
-/// [`ErrorKind::Argument`]: an angle that is not a whole number of degrees, a view index of `n_views` or more, or
-/// a number above 99999.
+/// [`ErrorKind::Argument`]: an angle that is not a whole number of degrees, a view index of `n_views` or more,
+/// or a number above 99999.
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{directions_81, write_name};

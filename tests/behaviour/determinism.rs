@@ -1,0 +1,71 @@
+//! The same bytes whatever the threads, the kernel, the band and the form of the archive.
+
+use crate::fixture::{ENLARGED, assert_same, btf, fixture, succeed, unpack};
+
+#[test]
+fn threads_and_kernels_change_no_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, threads, kernel) in [("one", "1", "plain"), ("three", "3", "")] {
+        let [measurement, model, enlarged] = ["zarr", "model.zarr", "big.zarr"]
+            .map(|end| folder.path().join(name).join(format!("sample.{end}")));
+        let run = |arguments: &[&str], paths: &[&std::path::PathBuf]| {
+            succeed(
+                btf()
+                    .env("BTFKIT_KERNEL", kernel)
+                    .arg(arguments[0])
+                    .args(paths)
+                    .args(&arguments[1..])
+                    .args(["--threads", threads]),
+            )
+        };
+        run(&["import"], &[&fixture().archive(), &measurement]);
+        run(&["model", "--clusters", "24"], &[&measurement, &model]);
+        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
+        // The fixture's model has another name, which the recipe of an enlargement records.
+        run(&["enlarge", "--size", &size, "--keep-normals"], &[&model, &enlarged]);
+    }
+    let [one, three] = ["one", "three"].map(|name| folder.path().join(name));
+    assert_same(&one, &three);
+    assert_same(&one.join("sample.zarr"), &fixture().measurement());
+}
+
+#[test]
+fn the_band_height_changes_no_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    for band in ["1", "7", "600"] {
+        let output = folder.path().join(band);
+        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
+        succeed(btf().arg("enlarge").args([&fixture().model(), &output]).args([
+            "--size",
+            &size,
+            "--keep-normals",
+            "--band",
+            band,
+        ]));
+        assert_same(&output, &fixture().enlarged());
+    }
+}
+
+#[test]
+fn a_folder_of_views_gives_the_store_of_the_zip() {
+    let folder = tempfile::tempdir().unwrap();
+    let (images, store) = (folder.path().join("MANYFILES"), folder.path().join("store.zarr"));
+    unpack(&fixture().archive(), &images);
+    std::fs::write(images.join("readme.txt"), "not an image").unwrap();
+    succeed(btf().arg("import").args([&images, &store]));
+    assert_same(&store, &fixture().measurement());
+}
+
+#[test]
+fn the_random_field_of_another_seed_is_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("other");
+    succeed(
+        btf().arg("enlarge").args([&fixture().model(), &output]).args(["--size", "64x64", "--seed", "2"]),
+    );
+    let read = |path: &std::path::Path| {
+        let store = btfkit::store::enlarged::Enlarged::open(path).unwrap();
+        store.read(btfkit::shape::Size::new(64, 64).window()).unwrap()
+    };
+    assert_ne!(read(&output), read(&fixture().enlarged()));
+}

@@ -1,0 +1,130 @@
+//! A small measurement and its models, made once, and helpers to run the program.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use tempfile::TempDir;
+
+/// Everything that the tests start from. `measurement`, `model` and `enlarged` are never written again.
+pub struct Fixture {
+    folder: TempDir,
+}
+
+impl Fixture {
+    pub fn archive(&self) -> PathBuf {
+        self.folder.path().join("sample.zip")
+    }
+    pub fn measurement(&self) -> PathBuf {
+        self.folder.path().join("sample.zarr")
+    }
+    pub fn model(&self) -> PathBuf {
+        self.folder.path().join("sample.model.zarr")
+    }
+    pub fn enlarged(&self) -> PathBuf {
+        self.folder.path().join("big.zarr")
+    }
+}
+
+/// The size of the fixture's enlarged index: two rows of shards, neither size a multiple of a shard.
+pub const ENLARGED: [usize; 2] = [700, 530];
+
+pub fn fixture() -> &'static Fixture {
+    static FIXTURE: OnceLock<Fixture> = OnceLock::new();
+    FIXTURE.get_or_init(|| {
+        let fixture = Fixture { folder: tempfile::tempdir().unwrap() };
+        let [archive, measurement, model, enlarged] =
+            [fixture.archive(), fixture.measurement(), fixture.model(), fixture.enlarged()];
+        succeed(
+            btf().arg("sample").arg(&archive).args(["--size", "56x48", "--views", "9", "--lights", "19"]),
+        );
+        succeed(btf().arg("import").args([&archive, &measurement]));
+        succeed(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
+        succeed(btf().arg("enlarge").args([&model, &enlarged]).args(["--size", &size, "--keep-normals"]));
+        fixture
+    })
+}
+
+pub fn btf() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_btf"));
+    command.stdin(Stdio::null());
+    command
+}
+
+pub fn succeed(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{command:?}: {told}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Runs a command that must fail with this exit code; returns what it said.
+pub fn fail(command: &mut Command, code: i32) -> String {
+    let Output { status, stderr, .. } = command.output().unwrap();
+    let told = String::from_utf8_lossy(&stderr).into_owned();
+    assert_eq!(status.code(), Some(code), "{command:?}: {told}");
+    assert!(!told.contains("panicked"), "{told}");
+    told
+}
+
+/// Every file below a folder and its bytes.
+pub fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(at) = folders.pop() {
+        for entry in std::fs::read_dir(&at).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.insert(path.strip_prefix(folder).unwrap().to_owned(), std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+/// Asserts that two stores hold the same files with the same bytes.
+pub fn assert_same(first: &Path, second: &Path) {
+    let (a, b) = (tree(first), tree(second));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in &a {
+        assert!(
+            bytes == &b[name],
+            "{} differs between {} and {}",
+            name.display(),
+            first.display(),
+            second.display()
+        );
+    }
+}
+
+/// Unpacks an archive into a folder with the library's own reader.
+pub fn unpack(archive: &Path, folder: &Path) -> Vec<PathBuf> {
+    let bytes = std::fs::read(archive).unwrap();
+    let index = btfkit_formats::zip::ZipIndex::open(&bytes, &btfkit_formats::Limits::default()).unwrap();
+    let unpack = |(number, entry): (usize, &btfkit_formats::zip::ZipEntry)| {
+        let path = folder.join(entry.name());
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, index.read(&bytes, number).unwrap()).unwrap();
+        path
+    };
+    index.entries().iter().enumerate().map(unpack).collect()
+}
+
+/// Names of the files below a folder that may be changing.
+pub fn tree_names(folder: &Path) -> Vec<PathBuf> {
+    let (mut names, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(at) = folders.pop() {
+        for path in std::fs::read_dir(&at).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                names.push(path);
+            }
+        }
+    }
+    names
+}

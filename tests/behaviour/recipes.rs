@@ -1,0 +1,115 @@
+//! Results of another recipe are refused, results of the same are kept, and what is missing is named.
+
+use crate::fixture::{btf, fail, fixture, succeed, tree};
+
+#[test]
+fn a_finished_command_run_again_changes_nothing() {
+    let fixture = fixture();
+    let before = tree(&fixture.model());
+    let told = succeed(btf().arg("import").args([&fixture.archive(), &fixture.measurement()]));
+    assert!(told.contains("0 views written, 9 found done"), "{told}");
+    succeed(btf().arg("model").args([&fixture.measurement(), &fixture.model()]).args(["--clusters", "24"]));
+    assert_eq!(before, tree(&fixture.model()));
+}
+
+#[test]
+fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
+    let fixture = fixture();
+    let import = fail(
+        btf().arg("import").args([&fixture.archive(), &fixture.measurement()]).args(["--white", "0.5"]),
+        65,
+    );
+    assert!(import.contains("white was 1.0, now 0.5"), "{import}");
+    let model = fail(
+        btf().arg("model").args([&fixture.measurement(), &fixture.model()]).args(["--clusters", "25"]),
+        65,
+    );
+    assert!(model.contains("clusters was 24, now 25"), "{model}");
+    let enlarge = fail(
+        btf().arg("enlarge").args([&fixture.model(), &fixture.enlarged()]).args(["--size", "64x64"]),
+        65,
+    );
+    assert!(enlarge.contains("size was"), "{enlarge}");
+}
+
+#[test]
+fn a_stage_that_has_not_been_run_is_named() {
+    let fixture = fixture();
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.zarr");
+    fail(btf().arg("cluster").args([&fixture.measurement(), &model]), 66);
+    succeed(btf().arg("tile").args([&fixture.measurement(), &model]));
+    let told = fail(btf().arg("fit").arg(&model), 66);
+    assert!(told.contains("normals"), "{told}");
+    let told =
+        fail(btf().arg("enlarge").arg(&model).arg(folder.path().join("big")).args(["--size", "64x64"]), 66);
+    assert!(told.contains("cluster"), "{told}");
+}
+
+#[test]
+fn the_stages_one_by_one_make_the_model_of_one_go() {
+    let fixture = fixture();
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.zarr");
+    succeed(btf().arg("tile").args([&fixture.measurement(), &model]));
+    succeed(btf().arg("normals").args([&fixture.measurement(), &model]));
+    succeed(btf().arg("fit").arg(&model));
+    succeed(btf().arg("cluster").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    let (mut one_by_one, mut one_go) = (tree(&model), tree(&fixture.model()));
+    let attributes = |tree: &mut std::collections::BTreeMap<_, Vec<u8>>| -> serde_json::Value {
+        serde_json::from_slice(&tree.remove(std::path::Path::new("zarr.json")).unwrap()).unwrap()
+    };
+    assert_eq!(attributes(&mut one_by_one), attributes(&mut one_go));
+    assert_eq!(one_by_one, one_go);
+}
+
+#[test]
+fn a_model_is_not_mixed_with_another_measurement() {
+    let fixture = fixture();
+    let folder = tempfile::tempdir().unwrap();
+    let (archive, other) = (folder.path().join("other.zip"), folder.path().join("other.zarr"));
+    succeed(
+        btf()
+            .arg("sample")
+            .arg(&archive)
+            .args(["--size", "56x48", "--views", "3", "--lights", "7", "--seed", "9"]),
+    );
+    succeed(btf().arg("import").args([&archive, &other]));
+    let told = fail(btf().arg("compare").args([&fixture.model(), &other]), 65);
+    assert!(told.contains("another measurement"), "{told}");
+}
+
+#[test]
+fn a_dry_run_prints_the_plan_and_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("store.zarr");
+    let told = succeed(btf().arg("import").args([&fixture().archive(), &store]).arg("--dry-run"));
+    let plan: serde_json::Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(plan["views"], 9);
+    assert!(!store.exists());
+}
+
+#[test]
+fn usage_errors_exit_with_2() {
+    let fixture = fixture();
+    let big = tempfile::tempdir().unwrap();
+    fail(btf().arg("enlarge").args([&fixture.model(), &big.path().join("b")]).args(["--size", "0x5"]), 2);
+    fail(
+        btf().arg("enlarge").args([&fixture.model(), &big.path().join("b")]).args([
+            "--size",
+            "9x9",
+            "--candidates",
+            "0",
+        ]),
+        2,
+    );
+    fail(
+        btf().arg("tile").args([&fixture.measurement(), &big.path().join("m")]).args(["--tile", "900x900"]),
+        2,
+    );
+    let told = fail(
+        btf().arg("cluster").args([&fixture.measurement(), &fixture.model()]).args(["--clusters", "1000000"]),
+        2,
+    );
+    assert!(told.contains("1000000"), "{told}");
+}

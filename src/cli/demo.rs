@@ -7,9 +7,15 @@ use btfkit::sample::Kind;
 use clap::{Args, ValueEnum};
 
 use super::Tell;
+use super::table::{row, table};
 
 /// The whole method on a made material: sample, import, model, enlarge, pictures and a page
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf demo
+  btf demo wood-demo --material wood
+Takes about a minute and 1 GB of disk. Interrupted, the same command goes on.")]
 pub(super) struct Demo {
     /// Folder for everything that is made
     #[arg(default_value = "demo")]
@@ -31,8 +37,11 @@ impl Demo {
             Material::Wood => Kind::Wood,
             Material::Leather => Kind::Leather,
         };
-        let page = demo::run(&demo::Options { folder: self.folder.clone(), kind }, context)?;
-        tell.line(format!("open {} in a browser", page.display()));
+        let report = demo::run(&demo::Options { folder: self.folder.clone(), kind }, context)?;
+        let rows: Vec<_> =
+            report.steps.iter().map(|step| row![step.name, format!("{:.2} s", step.seconds)]).collect();
+        tell.line(table(&rows));
+        tell.line(format!("open {} in a browser", report.page.display()));
         Ok(())
     }
 }

@@ -6,7 +6,7 @@ use btfkit::shape::Size;
 use btfkit::stage::enlarge;
 use clap::Args;
 
-use super::Tell;
+use super::{Tell, bytes_text};
 
 /// Model to enlarged index of any size
 #[derive(Args)]
@@ -63,6 +63,12 @@ impl Enlarge {
             self.seed,
             report.shard_rows_written,
             report.shard_rows_found
+        ));
+        tell.line(format!(
+            "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
+            bytes_text(report.stored_bytes),
+            report.raw_bytes as f64 / report.stored_bytes as f64,
+            bytes_text(report.raw_bytes)
         ));
         Ok(())
     }

@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use btfkit::archive::Archive;
 use btfkit::error::Result;
+use btfkit::stage::cluster;
 use btfkit::store::Store;
 use btfkit::store::enlarged::{self, Enlarged};
 use btfkit::store::measurement::{self, Measurement};
@@ -71,6 +72,16 @@ impl Info {
         for stage in [Stage::Tile, Stage::Cluster, Stage::Normals, Stage::Fit] {
             let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
             rows.push(row![stage.name(), done]);
+        }
+        if model.stage(Stage::Cluster)?.is_some() {
+            let report: cluster::Report = model.report(Stage::Cluster)?;
+            for (number, pass) in report.passes.iter().enumerate() {
+                let found = format!(
+                    "mean weighted |dL*| {:.4}, {} texels moved",
+                    pass.mean_lightness_error, pass.moved
+                );
+                rows.push(row![format!("  pass {}", number + 1), found]);
+            }
         }
         Ok(rows)
     }

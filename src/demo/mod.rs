@@ -1,16 +1,300 @@
-//! placeholder
+//! The whole method on a made material, and a page that tells the story of the run.
+//!
+//! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
+//! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.
+
+mod figures;
+mod page;
+mod pictures;
+mod story;
+mod times;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+pub use times::Step;
+
+use crate::color::Transfer;
+use crate::demo::figures::Figures;
+use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
+use crate::demo::story::Section;
+use crate::demo::times::Times;
 use crate::error::Result;
-use crate::run::Context;
+use crate::mrf;
+use crate::picture::write_file;
+use crate::run::progress::Counted;
+use crate::run::{Context, units};
 use crate::sample::Kind;
-use std::path::PathBuf;
-/// p
+use crate::shape::Size;
+use crate::stage::tile::Choice;
+use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
+use crate::store::enlarged::Enlarged;
+use crate::store::measurement::Measurement;
+use crate::store::model::{Model, Stage};
+use crate::texel::cluster::centre::CentreRule;
+use crate::texel::cluster::lloyd::Limits;
+
+/// What to demonstrate.
+#[derive(Clone, Debug)]
 pub struct Options {
-    /// p
+    /// Folder for everything that is made.
     pub folder: PathBuf,
-    /// p
+    /// Which material.
     pub kind: Kind,
 }
-/// p
-pub fn run(_: &Options, _: &Context<'_>) -> Result<PathBuf> {
-    Ok(PathBuf::new())
+
+/// What was made.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The page.
+    pub page: PathBuf,
+    /// Every step and its time, in the order of the run.
+    pub steps: Vec<Step>,
+}
+
+/// Settings of the run; where the program has a default for one, that default.
+struct Settings {
+    kind: Kind,
+    sample: Size,
+    directions: usize,
+    clusters: usize,
+    passes: usize,
+    tolerance: f64,
+    enlarged: Size,
+    candidates: usize,
+    seed: u64,
+}
+
+impl Settings {
+    fn new(kind: Kind) -> Self {
+        Self {
+            kind,
+            sample: Size { height: 176, width: 176 },
+            directions: 81,
+            clusters: 256,
+            passes: 50,
+            tolerance: 1e-4,
+            enlarged: Size { height: 1024, width: 1024 },
+            candidates: 16,
+            seed: 1,
+        }
+    }
+
+    /// Name of the material, as the program takes it.
+    fn material(&self) -> &'static str {
+        match self.kind {
+            Kind::Wood => "wood",
+            Kind::Leather => "leather",
+        }
+    }
+}
+
+/// Names of what is made, relative to the folder.
+mod names {
+    pub(super) const ARCHIVE: &str = "sample.zip";
+    pub(super) const MEASUREMENT: &str = "measurement.zarr";
+    pub(super) const MODEL: &str = "material.model.zarr";
+    pub(super) const ENLARGED: &str = "enlarged.zarr";
+    pub(super) const PICTURES: &str = "pictures";
+    pub(super) const PAGE: &str = "index.html";
+    pub(super) const RECORD: &str = "demo.json";
+}
+
+/// Memory that a picture of the enlarged size takes while it is made and encoded: 1024 x 1024 values
+/// twice, display bytes, two encoded files.
+const PICTURE_BYTES: u64 = 40 << 20;
+
+/// Runs the demo, or goes on with it.
+///
+/// # Errors
+/// [`crate::Kind::Recipe`] where the folder holds the demo of another material, and whatever the stages
+/// report.
+pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
+    run_with(&Settings::new(options.kind), &options.folder, context)
+}
+
+fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result<Report> {
+    let place = |name: &str| folder.join(name);
+    let recipe = json!({
+        "stage": "demo",
+        "material": settings.material(),
+        "size": [settings.sample.height, settings.sample.width],
+        "directions": settings.directions,
+        "clusters": settings.clusters,
+        "enlarged": [settings.enlarged.height, settings.enlarged.width],
+        "seed": settings.seed,
+    });
+    let mut times = Times::open(place(names::RECORD), recipe)?;
+    let [archive, measurement, model, enlarged] =
+        [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED].map(place);
+    measure(settings, &archive, &measurement, &mut times, context)?;
+    analyse(settings, &measurement, &model, &mut times, context)?;
+    enlarge(settings, &model, &enlarged, &mut times, context)?;
+
+    // These are made anew by every run: they read what the stages left and take a few seconds.
+    let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
+    let compared = times.time("compare", false, || compare::run(&compare, context))?;
+    let workshop = Workshop::open([&measurement, &model, &enlarged], settings.seed, context)?;
+    let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
+    let figures = Figures::gather(&workshop, compared, places, context)?;
+    let mut sections = story::sections(&figures, settings);
+    let pictures = place(names::PICTURES);
+    let embedded = times.time("pictures", false, || embed(&sections, &workshop, &pictures, context))?;
+    sections.push(story::times(&times.steps));
+    let page = place(names::PAGE);
+    write_file(&page, page::render(&story::title(settings), &sections, &embedded).as_bytes())?;
+    Ok(Report { page, steps: times.steps })
+}
+
+/// Makes the sample and imports it.
+fn measure(
+    settings: &Settings,
+    archive: &Path,
+    store: &Path,
+    times: &mut Times,
+    context: &Context<'_>,
+) -> Result<()> {
+    let found = archive.exists();
+    times.time("sample", found, || {
+        if found {
+            return Ok(());
+        }
+        let options = sample::Options {
+            archive: archive.to_owned(),
+            kind: settings.kind,
+            size: settings.sample,
+            views: settings.directions,
+            lights: settings.directions,
+            seed: settings.seed,
+            scale: 1.0,
+        };
+        sample::run(&options, context).map(|_| ())
+    })?;
+    let options = import::Options {
+        archive: archive.to_owned(),
+        store: store.to_owned(),
+        transfer: Transfer::Srgb,
+        white: 1.0,
+    };
+    let found = Measurement::open(store).is_ok_and(|m| m.views_done() == settings.directions);
+    times.time("import", found, || import::plan(&options)?.run(context).map(|_| ()))
+}
+
+/// Analyses the measurement.
+fn analyse(
+    settings: &Settings,
+    measurement: &Path,
+    model: &Path,
+    times: &mut Times,
+    context: &Context<'_>,
+) -> Result<()> {
+    let found = |stage: Stage| Model::open(model).and_then(|m| m.stage(stage)).is_ok_and(|s| s.is_some());
+    let (measurement, model) = (measurement.to_owned(), model.to_owned());
+    times.time("tile", found(Stage::Tile), || {
+        let (measurement, model) = (measurement.clone(), model.clone());
+        let options = tile::Options { measurement, model, choice: Choice::Auto, seed: settings.seed };
+        tile::plan(&options)?.run(context).map(|_| ())
+    })?;
+    times.time("cluster", found(Stage::Cluster), || {
+        let options = cluster::Options {
+            measurement: measurement.clone(),
+            model: model.clone(),
+            clusters: settings.clusters,
+            centre: CentreRule::Median,
+            limits: Limits { passes: settings.passes, tolerance: settings.tolerance },
+            seed: settings.seed,
+        };
+        cluster::plan(&options)?.run(context).map(|_| ())
+    })?;
+    times.time("normals", found(Stage::Normals), || {
+        let (measurement, model) = (measurement.clone(), model.clone());
+        normals::plan(&normals::Options { measurement, model, robust: false })?.run(context).map(|_| ())
+    })?;
+    times.time("fit", found(Stage::Fit), || {
+        let options = fit::Options { model: model.clone(), kind: mrf::Kind::Car3d, levels: None };
+        fit::plan(&options)?.run(context).map(|_| ())
+    })
+}
+
+/// Enlarges the model.
+fn enlarge(
+    settings: &Settings,
+    model: &Path,
+    output: &Path,
+    times: &mut Times,
+    context: &Context<'_>,
+) -> Result<()> {
+    let options = enlarge::Options {
+        model: model.to_owned(),
+        output: output.to_owned(),
+        size: settings.enlarged,
+        seed: settings.seed,
+        candidates: settings.candidates,
+        keep_normals: true,
+        band_rows: 32,
+    };
+    let found = Enlarged::open(output).is_ok_and(|e| (0..e.shard_rows()).all(|row| e.has_shard_row(row)));
+    times.time("enlarge", found, || enlarge::plan(&options)?.run(context).map(|_| ()))
+}
+
+/// Makes the pictures of all sections, in their order.
+fn embed(
+    sections: &[Section],
+    workshop: &Workshop,
+    folder: &Path,
+    context: &Context<'_>,
+) -> Result<Vec<Embedded>> {
+    let shots: Vec<_> = sections.iter().flat_map(Section::shots).collect();
+    context.progress.begin("pictures", shots.len() as u64, Counted::Items("pictures"));
+    let in_flight = units::in_flight(context, PICTURE_BYTES);
+    let embedded = units::for_each(context, &shots, in_flight, |shot| {
+        let path = folder.join(&shot.file).with_extension("png");
+        let embedded = write_and_embed(&workshop.picture(shot.subject, context)?, &path)?;
+        context.progress.advance(1);
+        Ok(embedded)
+    })?;
+    context.progress.end();
+    Ok(embedded)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+    use crate::run::progress::Silent;
+
+    #[test]
+    fn a_small_demo_runs_to_its_page_and_runs_again_without_redoing_stages() {
+        let settings = Settings {
+            sample: Size::new(64, 64),
+            directions: 13,
+            clusters: 16,
+            enlarged: Size::new(96, 80),
+            ..Settings::new(Kind::Wood)
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let stop = AtomicBool::new(false);
+        let context = Context { progress: &Silent, stop: &stop, threads: 2, memory_bytes: 256 << 20 };
+        let first = run_with(&settings, folder.path(), &context).unwrap();
+        let page = std::fs::read_to_string(&first.page).unwrap();
+        let pictures = std::fs::read_dir(folder.path().join(names::PICTURES)).unwrap().count();
+        assert_eq!(page.matches("<figure>").count(), pictures);
+        assert_eq!(page.matches("src=\"data:image/").count(), pictures);
+        let text: String = page.lines().filter(|line| !line.contains("<img")).collect();
+        assert!(text.contains("From 169 photographs of wood"));
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+
+        let modified = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().modified().unwrap();
+        let made = ["sample.zip", "material.model.zarr/index", "enlarged.zarr/index/c/0/0"];
+        let before = made.map(modified);
+        let second = run_with(&settings, folder.path(), &context).unwrap();
+        assert_eq!(made.map(modified), before);
+        for (first, second) in first.steps.iter().zip(&second.steps) {
+            let anew = ["compare", "pictures"].contains(&first.name.as_str());
+            assert!(anew || first.seconds == second.seconds, "{first:?} became {second:?}");
+        }
+    }
 }

@@ -185,6 +185,7 @@ mod tests {
     #[test]
     fn an_exr_holds_the_values_themselves() {
         let bytes = picture().exr().unwrap();
+        use exr::prelude::{ReadChannels, ReadLayers};
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()

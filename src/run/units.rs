@@ -45,3 +45,49 @@ pub fn for_each<U: Sync, T: Send>(
     results.sort_by_key(|(number, _)| *number);
     results.into_iter().map(|(_, result)| result).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::error::{Error, Kind};
+    use crate::run::progress::Silent;
+    use std::sync::atomic::AtomicBool;
+    use std::time::Duration;
+
+    fn context(stop: &AtomicBool) -> Context<'_> {
+        Context { progress: &Silent, stop, threads: 4, memory_bytes: 100 }
+    }
+
+    #[test]
+    fn results_come_in_the_order_of_the_units_whoever_ends_first() {
+        let stop = AtomicBool::new(false);
+        let results = for_each(&context(&stop), &[40, 0, 20, 0], 4, |&delay| {
+            std::thread::sleep(Duration::from_millis(delay));
+            Ok(delay)
+        });
+        assert_eq!(results.unwrap(), [40, 0, 20, 0]);
+    }
+
+    #[test]
+    fn a_failure_or_a_stop_ends_the_work() {
+        let stop = AtomicBool::new(false);
+        let done = AtomicUsize::new(0);
+        let units: Vec<usize> = (0..1000).collect();
+        let failing = |&unit: &usize| {
+            done.fetch_add(1, Ordering::Relaxed);
+            if unit == 3 { Err(Error::input("unit 3")) } else { Ok(()) }
+        };
+        let error = for_each(&context(&stop), &units, 1, failing).unwrap_err();
+        assert_eq!((error.kind(), done.into_inner()), (Kind::Input, 4));
+        stop.store(true, Ordering::Relaxed);
+        let error = for_each(&context(&stop), &units, 2, |_| Ok(())).unwrap_err();
+        assert_eq!(error.kind(), Kind::Stopped);
+    }
+
+    #[test]
+    fn memory_bounds_the_units_in_flight() {
+        let stop = AtomicBool::new(false);
+        assert_eq!([10, 30, 60, 1000].map(|bytes| in_flight(&context(&stop), bytes)), [4, 3, 1, 1]);
+    }
+}

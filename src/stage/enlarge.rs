@@ -12,6 +12,7 @@ use crate::mrf::Synthesis;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::{Size, Window};
+use crate::stage::cluster;
 use crate::store::enlarged::{Description, Enlarged, SHARD_SIDE};
 use crate::store::model::{Model, Stage};
 use crate::texel::nearest::{NearestNormals, Neighbour};
@@ -41,12 +42,19 @@ pub struct Plan {
     model: Model,
     options: Options,
     description: Description,
+    clusters: cluster::Report,
+    /// Texels of the tile.
+    texels: u64,
     recipe: Value,
 }
 
-/// How it went.
+/// How it went, and what it saves.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
+    /// Bytes of the enlarged index and of the representatives that it refers to.
+    pub stored_bytes: u64,
+    /// Bytes of the enlarged BTF's raw samples.
+    pub raw_bytes: u64,
     /// Rows of shards found done.
     pub shard_rows_found: usize,
     /// Rows of shards written by this run.
@@ -64,9 +72,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
             options.candidates
         )));
     }
-    let clusters: Value =
-        model.stage(Stage::Cluster)?.and_then(|entry| entry.get("report").cloned()).unwrap_or_default();
-    let clusters = clusters.get("clusters").and_then(Value::as_u64).unwrap_or(0) as usize;
+    let clusters: cluster::Report = model.report(Stage::Cluster)?;
     let recipe = json!({
         "stage": "enlarge",
         "model": digest,
@@ -76,23 +82,28 @@ pub fn plan(options: &Options) -> Result<Plan> {
         "candidates": options.candidates,
         "keep_normals": options.keep_normals,
     });
-    let description = Description { size: options.size, clusters, keep_normals: options.keep_normals };
-    Ok(Plan { model, options: options.clone(), description, recipe })
+    let description =
+        Description { size: options.size, clusters: clusters.clusters, keep_normals: options.keep_normals };
+    Ok(Plan { model, options: options.clone(), description, clusters, texels: texels as u64, recipe })
 }
 
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
-        let Size { height, width } = self.options.size;
+        let height = self.options.size.height;
         json!({
             "stage": "enlarge",
             "output": self.options.output,
             "units": height.div_ceil(SHARD_SIDE),
             "unit": "row of shards",
-            "index_bytes": height * width * if self.description.clusters > 256 { 2 } else { 1 },
+            "index_bytes": self.index_bytes(),
             "memory_bytes": self.memory_bytes(),
             "recipe": self.recipe,
         })
+    }
+
+    fn index_bytes(&self) -> u64 {
+        self.options.size.texels() as u64 * if self.description.clusters > 256 { 2 } else { 1 }
     }
 
     fn memory_bytes(&self) -> usize {
@@ -107,16 +118,22 @@ impl Plan {
     /// After an interruption the field is run through again (its rows depend on those above), but
     /// candidates are only sought for rows of shards that are missing.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let output = Enlarged::create(&self.options.output, &self.description, &self.recipe)?;
         let Size { height, width } = self.options.size;
-        let found = (0..output.shard_rows()).take_while(|&row| output.has_shard_row(row)).count();
-        let report = Report { shard_rows_found: found, shard_rows_written: output.shard_rows() - found };
-        if report.shard_rows_written == 0 {
-            return Ok(report);
-        }
+        // All that can fail for the model's sake comes before the output is begun.
         let normals = NearestNormals::new(&self.model.normals()?);
         let scan = Scan::new(self.model.index()?, self.model.distance()?);
         let mut field = Synthesis::new(&self.model.field()?, self.options.seed, height, width)?;
+        let output = Enlarged::create(&self.options.output, &self.description, &self.recipe)?;
+        let found = (0..output.shard_rows()).take_while(|&row| output.has_shard_row(row)).count();
+        let report = Report {
+            stored_bytes: self.index_bytes() + self.clusters.representative_bytes,
+            raw_bytes: self.clusters.tile_bytes / self.texels * self.options.size.texels() as u64,
+            shard_rows_found: found,
+            shard_rows_written: output.shard_rows() - found,
+        };
+        if report.shard_rows_written == 0 {
+            return Ok(report);
+        }
         context.progress.begin("enlarge", (height * width) as u64, Counted::Items("texels"));
         let done = (found * SHARD_SIDE).min(height);
         for _ in 0..done {

@@ -59,11 +59,13 @@ pub fn directions(count: usize) -> Result<Vec<Angles>> {
     let total: f64 = RINGS_DEG.iter().map(|theta| theta.to_radians().sin()).sum();
     let mut angles = vec![(0.0, 0.0)];
     let (mut asked, mut given) = (0.0, 0);
-    for theta in RINGS_DEG {
+    for (number, theta) in RINGS_DEG.into_iter().enumerate() {
         asked += theta.to_radians().sin() / total * (count - 1) as f64;
         let ring = asked.round() as usize - given;
         given += ring;
-        angles.extend((0..ring).map(|k| (theta, (360.0 * k as f64 / ring as f64).round())));
+        // Rings of few directions are turned against each other, so that they do not all lie in one plane.
+        let turn = 0.382 * number as f64;
+        angles.extend((0..ring).map(|k| (theta, (360.0 * (k as f64 + turn) / ring as f64).round() % 360.0)));
     }
     angles
         .into_iter()
@@ -121,4 +123,27 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     context.progress.end();
     let bytes = std::fs::metadata(&options.archive).map_err(failed)?.len();
     Ok(Report { images: views.len() * lights.len(), bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::texel::direction::Direction;
+    use crate::texel::stereo::Stereo;
+
+    #[test]
+    fn any_number_of_directions_is_distinct_and_from_seven_on_they_span_space() {
+        for count in [1, 2, 7, 9, 13, 25, 80, 81, 82, 151, 600] {
+            let mut angles = directions(count).unwrap();
+            let lights: Vec<Direction> =
+                angles.iter().map(|a| Direction::from_degrees(a.theta_deg(), a.phi_deg())).collect();
+            assert_eq!(angles.len(), count);
+            assert!(count < 7 || Stereo::new(&lights).is_ok(), "{count} directions lie in one plane");
+            angles.sort();
+            angles.dedup();
+            assert_eq!(angles.len(), count);
+        }
+        assert!(directions(601).is_err());
+    }
 }

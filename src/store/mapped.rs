@@ -98,6 +98,11 @@ fn host() -> String {
     if name.is_empty() { "host".to_owned() } else { name }
 }
 
+/// Whether a file is a temporary one of a writer, dead or alive.
+pub(crate) fn is_temporary(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().contains(TEMPORARY))
+}
+
 fn is_abandoned(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let Some((_, owner)) = name.rsplit_once(TEMPORARY) else { return false };

@@ -54,10 +54,10 @@ impl Description {
         self.view_bytes() * self.views.len() as u64
     }
 
-    /// Side of a shard: the whole plane, or as much as keeps a shard within its limit.
-    fn shard_side(&self) -> usize {
+    /// Side of a shard: the whole plane, or as much as keeps a shard within `limit_bytes`.
+    fn shard_side(&self, limit_bytes: usize) -> usize {
         let texel_bytes = self.lights.len() * self.channels;
-        let affordable = (SHARD_LIMIT_BYTES / texel_bytes.max(1)).isqrt() / CHUNK_SIDE * CHUNK_SIDE;
+        let affordable = (limit_bytes / texel_bytes.max(1)).isqrt() / CHUNK_SIDE * CHUNK_SIDE;
         let plane = self.size.height.max(self.size.width).next_multiple_of(CHUNK_SIDE);
         plane.min(affordable.max(CHUNK_SIDE))
     }
@@ -68,6 +68,8 @@ pub struct Measurement {
     store: Store,
     description: Description,
     digest: String,
+    /// Side of a shard in texels.
+    side: usize,
     reflectance: Array,
     luminance: Array,
 }
@@ -78,6 +80,15 @@ impl Measurement {
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
     pub fn create(path: &Path, description: Description, recipe: &Value) -> Result<Self> {
+        Self::create_in_shards(path, description, recipe, SHARD_LIMIT_BYTES)
+    }
+
+    fn create_in_shards(
+        path: &Path,
+        description: Description,
+        recipe: &Value,
+        limit_bytes: usize,
+    ) -> Result<Self> {
         let store = Store::at(path);
         match store.attributes()? {
             Some(found) => {
@@ -89,9 +100,10 @@ impl Measurement {
         }
         write_directions(&store, "view_direction", "view", &description.views)?;
         write_directions(&store, "light_direction", "light", &description.lights)?;
-        let (reflectance, luminance) =
-            (create_reflectance(&store, &description)?, create_luminance(&store, &description)?);
-        Ok(Self { store, description, digest: recipe::digest(recipe), reflectance, luminance })
+        let side = description.shard_side(limit_bytes);
+        let reflectance = create_reflectance(&store, &description, side)?;
+        let luminance = create_luminance(&store, &description, side)?;
+        Ok(Self { store, description, digest: recipe::digest(recipe), side, reflectance, luminance })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
@@ -134,7 +146,12 @@ impl Measurement {
             lights,
             transfer,
         };
-        Ok(Self { store, description, digest, reflectance, luminance })
+        let side = reflectance
+            .chunk_shape(&[0; 5])
+            .ok()
+            .and_then(|shape| shape.get(1).map(|side| side.get() as usize))
+            .ok_or_else(|| damaged("reflectance: no shard shape".to_owned()))?;
+        Ok(Self { store, description, digest, side, reflectance, luminance })
     }
 
     /// What it holds.
@@ -174,7 +191,7 @@ impl Measurement {
 
     fn write_shards(&self, array: &Array, view: usize, samples: Vec<u8>, texel_bytes: usize) -> Result<()> {
         let Size { height, width } = self.description.size;
-        let side = self.description.shard_side();
+        let side = self.side;
         let index = |sy: u64, sx: u64| {
             let mut index = vec![0; array.dimensionality()];
             (index[0], index[1], index[2]) = (view as u64, sy, sx);
@@ -200,7 +217,7 @@ impl Measurement {
 
     fn shards(&self) -> impl Iterator<Item = (u64, u64)> + use<> {
         let Size { height, width } = self.description.size;
-        let side = self.description.shard_side();
+        let side = self.side;
         let across = width.div_ceil(side) as u64;
         (0..height.div_ceil(side) as u64).flat_map(move |sy| (0..across).map(move |sx| (sy, sx)))
     }
@@ -240,9 +257,9 @@ fn attributes(description: &Description, recipe: &Value) -> Map<String, Value> {
     value.as_object().cloned().unwrap_or_default()
 }
 
-fn create_reflectance(store: &Store, description: &Description) -> Result<Array> {
+fn create_reflectance(store: &Store, description: &Description, side: usize) -> Result<Array> {
     let mut layout =
-        sample_layout(description, &["view", "y", "x", "light", "channel"], description.channels);
+        sample_layout(description, &["view", "y", "x", "light", "channel"], description.channels, side);
     let names: &[&str] = if description.channels == 3 { &["R", "G", "B"] } else { &["Y"] };
     layout.attributes.insert("channels".to_owned(), json!(names));
     layout
@@ -251,8 +268,8 @@ fn create_reflectance(store: &Store, description: &Description) -> Result<Array>
     store.create_array("reflectance", &layout)
 }
 
-fn create_luminance(store: &Store, description: &Description) -> Result<Array> {
-    let mut layout = sample_layout(description, &["view", "y", "x", "light"], 1);
+fn create_luminance(store: &Store, description: &Description, side: usize) -> Result<Array> {
+    let mut layout = sample_layout(description, &["view", "y", "x", "light"], 1, side);
     layout.shape.pop();
     layout.chunk.pop();
     layout.shard.as_mut().map(Vec::pop);
@@ -261,10 +278,15 @@ fn create_luminance(store: &Store, description: &Description) -> Result<Array> {
 }
 
 /// The layout of `reflectance`: [view, y, x, light, channel] in shards of one view.
-fn sample_layout<'a>(description: &Description, names: &'a [&'a str], channels: usize) -> Layout<'a> {
+fn sample_layout<'a>(
+    description: &Description,
+    names: &'a [&'a str],
+    channels: usize,
+    side: usize,
+) -> Layout<'a> {
     let Size { height, width } = description.size;
     let (lights, channels) = (description.lights.len() as u64, channels as u64);
-    let side = description.shard_side() as u64;
+    let side = side as u64;
     Layout {
         shape: vec![description.views.len() as u64, height as u64, width as u64, lights, channels],
         chunk: vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, lights, channels],
@@ -304,5 +326,46 @@ pub(crate) fn read_directions(store: &Store, name: &str) -> Result<Vec<Direction
             directions[at].theta_rad,
             directions[at].phi_rad
         ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::random::Hash;
+
+    fn description(size: Size) -> Description {
+        let direction = |n: u32| Direction::from_degrees(f64::from(n), 0.0);
+        let (views, lights) = ((0..2).map(direction).collect(), (0..5).map(direction).collect());
+        Description { size, channels: 3, views, lights, transfer: Transfer::Srgb }
+    }
+
+    #[test]
+    fn planes_in_one_shard_and_in_many_give_back_what_was_written() {
+        let hash = Hash::new(1, 0);
+        for (size, limit, side) in [
+            (Size::new(32, 32), SHARD_LIMIT_BYTES, 32),
+            (Size::new(19, 41), SHARD_LIMIT_BYTES, 48),
+            (Size::new(37, 50), 16 * 16 * 15, 16),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let recipe = json!({"size": size.to_string()});
+            let measurement =
+                Measurement::create_in_shards(folder.path(), description(size), &recipe, limit).unwrap();
+            assert_eq!(measurement.side, side);
+            let bytes = |count: usize, salt: u32| -> Vec<u8> {
+                (0..count as u32).map(|n| hash.words(n, salt, 0)[0] as u8).collect()
+            };
+            let (samples, codes) = (bytes(size.texels() * 15, 0), bytes(size.texels() * 5, 1));
+            measurement.write_view(1, samples.clone(), codes.clone()).unwrap();
+            let measurement = Measurement::open(folder.path()).unwrap();
+            assert!(measurement.has_view(1) && !measurement.has_view(0));
+            assert_eq!(measurement.read_reflectance(1, size.window()).unwrap(), samples);
+            assert_eq!(measurement.read_luminance(1, size.window()).unwrap(), codes);
+            let window = Window { y: 14, x: 13, size: Size::new(5, 19) };
+            let rows = (14..19).flat_map(|y| &codes[(y * size.width + 13) * 5..(y * size.width + 32) * 5]);
+            assert_eq!(measurement.read_luminance(1, window).unwrap(), rows.copied().collect::<Vec<u8>>());
+        }
     }
 }

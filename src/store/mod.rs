@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
-use zarrs::array::codec::{Crc32cCodec, ShardingCodecOptions, SubchunkWriteOrder, ZstdCodec};
+use zarrs::array::codec::{ShardingCodecOptions, SubchunkWriteOrder, ZstdCodec};
 use zarrs::array::{
     ArrayBuilder, ArrayMetadataOptions, ArraySubset, CodecOptions, CodecSpecificOptions, DataType, Element,
     ElementOwned, FillValue, data_type,
@@ -110,19 +110,18 @@ impl Store {
         let text = match std::fs::read_to_string(&file) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                let occupied = self.path.is_file()
-                    || std::fs::read_dir(&self.path).is_ok_and(|mut entries| entries.next().is_some());
-                let sweepable = std::fs::read_dir(&self.path).is_ok_and(|mut entries| {
-                    entries.all(|e| e.is_ok_and(|e| e.file_name().to_string_lossy().starts_with('.')))
-                });
-                if occupied && !sweepable {
-                    return Err(Error::input(format!(
-                        "{} exists and is not a Zarr store (no zarr.json in it)",
-                        self.path.display()
-                    )));
+                // What a killed writer left of its first file is no obstacle.
+                let is_leftover = |entry: std::io::Result<std::fs::DirEntry>| {
+                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()))
+                };
+                let occupied =
+                    std::fs::read_dir(&self.path).is_ok_and(|mut entries| !entries.all(is_leftover));
+                if occupied {
+                    return Err(self.occupied());
                 }
                 return Ok(None);
             }
+            Err(_) if self.path.is_file() => return Err(self.occupied()),
             Err(error) => return Err(Error::io("read", &file, error)),
         };
         let damaged = |what: String| Error::input(format!("{}: {what}", file.display()));
@@ -134,6 +133,11 @@ impl Store {
             Some(FORMAT) => Ok(Some(ours.clone())),
             format => Err(damaged(format!("got layout format {format:?}, expected {FORMAT}"))),
         }
+    }
+
+    fn occupied(&self) -> Error {
+        Error::input(format!("{} exists and is not a Zarr store (no zarr.json in it)", self.path.display()))
+            .hint("choose another name for the result")
     }
 
     /// The attributes of a store that must exist and be of this kind.
@@ -170,10 +174,8 @@ impl Store {
         let zero = FillValue::new(vec![0; layout.data_type.fixed_size().unwrap_or(1)]);
         let mut builder = ArrayBuilder::new(layout.shape.clone(), outer, layout.data_type.clone(), zero);
         builder
-            .bytes_to_bytes_codecs(vec![
-                Arc::new(ZstdCodec::new(ZSTD_LEVEL, false)),
-                Arc::new(Crc32cCodec::new()),
-            ])
+            // The frame's own checksum: zarrs does not verify a crc32c codec when it reads a part of a shard.
+            .bytes_to_bytes_codecs(vec![Arc::new(ZstdCodec::new(ZSTD_LEVEL, true))])
             .dimension_names(Some(layout.names.iter().copied()))
             .attributes(layout.attributes.clone())
             .codec_specific_options(CodecSpecificOptions::default().with_option(

@@ -16,7 +16,7 @@ use crate::mrf::{Kind as FieldKind, Level, Model as FieldModel};
 use crate::run::recipe;
 use crate::shape::Size;
 use crate::store::measurement::{Description, read_directions, write_directions};
-use crate::store::{FORMAT, Layout, Store};
+use crate::store::{FORMAT, Layout, Named, Store};
 use crate::texel::direction::Direction;
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
@@ -190,9 +190,11 @@ impl Model {
     /// The cluster of each tile texel.
     pub fn index(&self) -> Result<Vec<u16>> {
         let Size { height, width } = self.tile()?.size;
-        let index = match self.store.open_array("index")?.data_type().to_string().as_str() {
-            "uint16" => self.store.read::<u16>("index", &[height, width])?.1,
-            _ => self.store.read::<u8>("index", &[height, width])?.1.into_iter().map(u16::from).collect(),
+        let wide = *self.store.open_array("index")?.data_type() == u16::data_type();
+        let index = if wide {
+            self.store.read::<u16>("index", &[height, width])?.1
+        } else {
+            self.store.read::<u8>("index", &[height, width])?.1.into_iter().map(u16::from).collect()
         };
         Ok(index)
     }

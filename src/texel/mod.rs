@@ -1,6 +1,7 @@
 //! Texels and their BRDFs: directions, tiles, clusters, normals, and looking values up.
 
 pub mod cluster;
+pub mod companion;
 pub mod direction;
 pub mod evaluate;
 pub mod nearest;

@@ -7,6 +7,9 @@ use crate::texel::direction::Direction;
 /// Two directions closer than this (chord length) are the same.
 const SAME_DIRECTION: f64 = 1e-7;
 
+/// Barycentric weights below this are rounding.
+const NEGLIGIBLE_WEIGHT: f64 = 1e-9;
+
 /// Spherical Delaunay triangles of directions above the plane: numbers of three directions each.
 ///
 /// Stereographic projection from the nadir maps circles to circles, so the planar Delaunay
@@ -70,15 +73,8 @@ impl Interpolator {
             .filter_map(|corners| Some((corners, self.barycentric(*corners, target)?)))
             .max_by(|(_, a), (_, b)| least(a).total_cmp(&least(b)));
         match within {
-            Some((corners, weights)) if least(&weights) > -1e-9 => {
-                let sum: f64 = weights.iter().map(|w| w.max(0.0)).sum();
-                let terms = corners
-                    .iter()
-                    .zip(weights)
-                    .filter(|(_, w)| *w > 0.0)
-                    .map(|(&c, w)| (c, w / sum))
-                    .collect();
-                Mix { terms, cosine_ratio: 1.0 }
+            Some((corners, weights)) if least(&weights) > -NEGLIGIBLE_WEIGHT => {
+                Mix { terms: shares(corners.iter().copied().zip(weights)), cosine_ratio: 1.0 }
             }
             _ => self.at_border(target).unwrap_or_else(|| exact(nearest)),
         }
@@ -124,8 +120,17 @@ impl Interpolator {
         let (_, point, terms) = self.border.iter().filter_map(crossing).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let cosine = point[2] / dot(point, point).sqrt();
         let cosine_ratio = (target[2] / cosine).clamp(0.0, 1.0);
-        Some(Mix { terms: terms.into_iter().filter(|(_, weight)| *weight > 0.0).collect(), cosine_ratio })
+        Some(Mix { terms: shares(terms), cosine_ratio })
     }
+}
+
+/// Weights that sum to 1; what rounding left of a corner that does not count is dropped.
+fn shares(weights: impl IntoIterator<Item = (usize, f64)>) -> Vec<(usize, f64)> {
+    let mut terms: Vec<(usize, f64)> =
+        weights.into_iter().filter(|(_, weight)| *weight > NEGLIGIBLE_WEIGHT).collect();
+    let sum: f64 = terms.iter().map(|(_, weight)| weight).sum();
+    terms.iter_mut().for_each(|(_, weight)| *weight /= sum);
+    terms
 }
 
 /// Edges that belong to one triangle only.
@@ -158,7 +163,7 @@ mod tests {
     fn bonn() -> Vec<Direction> {
         btfkit_formats::ubo2003::directions_81()
             .iter()
-            .map(|a| Direction::from_degrees(a.theta_deg, a.phi_deg))
+            .map(|a| Direction::from_degrees(a.theta_deg(), a.phi_deg()))
             .collect()
     }
 

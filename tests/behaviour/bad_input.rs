@@ -200,3 +200,46 @@ fn nonsense_metadata_is_refused() {
     }
     succeed(btf().arg("image").arg(&store).arg("--out").arg(&out));
 }
+
+/// Every byte of a store's metadata with one bit flipped, and many of a shard's: an error or a reading, never a panic.
+#[test]
+fn no_flipped_bit_of_a_store_brings_the_reader_down() {
+    use btfkit::store::measurement::Measurement;
+    let folder = tempfile::tempdir().unwrap();
+    let (archive, store) = (folder.path().join("s.zip"), folder.path().join("s.zarr"));
+    succeed(btf().arg("sample").arg(&archive).args(["--size", "16x16", "--views", "3", "--lights", "4"]));
+    succeed(btf().arg("import").args([&archive, &store]));
+    let read = || -> btfkit::Result<(Vec<u8>, Vec<u8>)> {
+        let measurement = Measurement::open(&store)?;
+        let window = measurement.description().size.window();
+        Ok((measurement.read_reflectance(1, window)?, measurement.read_luminance(1, window)?))
+    };
+    let truth = read().unwrap();
+    let mut refused = 0;
+    for (file, step) in [
+        ("zarr.json", 1),
+        ("reflectance/zarr.json", 1),
+        ("view_direction/zarr.json", 1),
+        ("view_direction/c/0/0", 1),
+        ("reflectance/c/1/0/0/0/0", 3),
+    ] {
+        let path = store.join(file);
+        let whole = std::fs::read(&path).unwrap();
+        for at in (0..whole.len()).step_by(step) {
+            let mut harmed = whole.clone();
+            harmed[at] ^= 1 << (at % 8);
+            std::fs::write(&path, &harmed).unwrap();
+            match read() {
+                Err(_) => refused += 1,
+                // Samples are covered by checksums: what is read of a harmed shard must be the truth.
+                Ok(found) if file.starts_with("reflectance/c") => {
+                    assert!(found == truth, "{file}, byte {at}")
+                }
+                Ok(_) => {}
+            }
+        }
+        std::fs::write(&path, &whole).unwrap();
+    }
+    assert!(read().unwrap() == truth);
+    assert!(refused > 1000, "{refused}");
+}

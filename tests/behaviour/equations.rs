@@ -91,3 +91,27 @@ fn a_rendered_height_field_gives_back_its_normals() {
     let (error, flat) = (error / truth.len() as f64, flat / truth.len() as f64);
     assert!(error < 5.0 && flat > 10.0, "mean angle {error} degrees, of a flat guess {flat}");
 }
+
+/// Every sample of the store is the decoded image's at its place, every code that of its colour.
+#[test]
+fn the_store_holds_the_decoded_images() {
+    use btfkit::archive::Archive;
+    let archive = Archive::open(&fixture().archive()).unwrap();
+    let measurement = btfkit::store::measurement::Measurement::open(&fixture().measurement()).unwrap();
+    let description = measurement.description();
+    let linear = description.transfer.table();
+    for view in 0..description.views.len() {
+        let samples = measurement.read_reflectance(view, description.size.window()).unwrap();
+        let codes = measurement.read_luminance(view, description.size.window()).unwrap();
+        for light in 0..description.lights.len() {
+            let bytes = archive.image_bytes(view, light).unwrap();
+            let image = btfkit_formats::jpeg::decode(&bytes, archive.limits()).unwrap();
+            for (texel, sample) in image.samples.chunks_exact(3).enumerate() {
+                let at = texel * description.lights.len() + light;
+                assert_eq!(&samples[at * 3..at * 3 + 3], sample, "view {view}, light {light}, texel {texel}");
+                let rgb: Vec<f64> = sample.iter().map(|&s| linear[usize::from(s)]).collect();
+                assert_eq!(codes[at], btfkit::color::lightness_code(btfkit::color::luminance(&rgb)));
+            }
+        }
+    }
+}

@@ -84,3 +84,17 @@ fn a_window_is_a_part_of_the_whole() {
         assert_eq!(part[y * 60..(y + 1) * 60], whole[at..at + 60]);
     }
 }
+
+#[test]
+fn more_than_256_clusters_work_to_the_last_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let [model, big, out] = ["wide.model.zarr", "wide.zarr", "wide.png"].map(|name| folder.path().join(name));
+    succeed(btf().arg("model").args([&fixture().measurement(), &model]).args(["--clusters", "300"]));
+    succeed(btf().arg("enlarge").args([&model, &big]).args(["--size", "40x30"]));
+    succeed(btf().arg("image").arg(&big).arg("--out").arg(&out));
+    let index = Model::open(&model).unwrap().index().unwrap();
+    assert!(
+        index.iter().any(|&cluster| cluster >= 256),
+        "the index must need 16 bits for this test to mean anything"
+    );
+}

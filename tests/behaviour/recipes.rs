@@ -26,7 +26,11 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
     );
     assert!(model.contains("clusters was 24, now 25"), "{model}");
     let enlarge = fail(
-        btf().arg("enlarge").args([&fixture.model(), &fixture.enlarged()]).args(["--size", "64x64"]),
+        btf().arg("enlarge").args([&fixture.model(), &fixture.enlarged()]).args([
+            "--size",
+            "64x64",
+            "--keep-normals",
+        ]),
         65,
     );
     assert!(enlarge.contains("size was"), "{enlarge}");

@@ -29,7 +29,7 @@ pub fn update(points: &Points, members: &[Vec<u32>], rule: CentreRule, centres: 
             let strip = number * STRIP..number * STRIP + values.len();
             let rows = members.iter().map(|&texel| &points.vector(texel as usize)[strip.clone()]);
             match rule {
-                CentreRule::Median => lower_medians(rows, members.len(), values),
+                CentreRule::Median => lower_medians(&rows, members.len(), values),
                 CentreRule::Mean => rounded_means(rows, members.len(), values),
             }
         }
@@ -38,7 +38,7 @@ pub fn update(points: &Points, members: &[Vec<u32>], rule: CentreRule, centres: 
 
 /// Lower medians of columns: bit by bit from the top, a bit is set where no more than (n - 1) / 2
 /// values lie below the trial.
-fn lower_medians<'a>(rows: impl Iterator<Item = &'a [u8]> + Clone, count: usize, medians: &mut [u8]) {
+fn lower_medians<'a>(rows: &(impl Iterator<Item = &'a [u8]> + Clone), count: usize, medians: &mut [u8]) {
     let rank = (count as u32 - 1) / 2;
     medians.fill(0);
     for bit in (0..8).rev() {
@@ -82,7 +82,7 @@ mod tests {
                 .map(|r| (0..40).map(|c| hash.words(r, c, count)[0] as u8 >> (c % 5)).collect())
                 .collect();
             let (mut medians, mut means) = (vec![7; 40], vec![7; 40]);
-            lower_medians(rows.iter().map(Vec::as_slice), rows.len(), &mut medians);
+            lower_medians(&rows.iter().map(Vec::as_slice), rows.len(), &mut medians);
             rounded_means(rows.iter().map(Vec::as_slice), rows.len(), &mut means);
             for column in 0..40 {
                 let mut values: Vec<u8> = rows.iter().map(|row| row[column]).collect();

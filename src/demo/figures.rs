@@ -1,0 +1,226 @@
+//! The figures that the page tells: errors, sizes, and how near the enlarged picture comes to the tile.
+
+use std::path::Path;
+
+use crate::demo::pictures::{Subject, Workshop};
+use crate::error::{Error, Result};
+use crate::picture::Picture;
+use crate::run::Context;
+use crate::stage::{cluster, compare, normals, tile};
+use crate::store::model::{FieldReport, Stage};
+use crate::texel::tile::seam_visibility;
+
+/// Side of the squares whose means tell how patchy a picture is, texels.
+pub(super) const BLOCK: usize = 16;
+
+/// All that the page tells in figures.
+pub(super) struct Figures {
+    pub(super) tile: tile::Report,
+    pub(super) cluster: cluster::Report,
+    pub(super) normals: normals::Report,
+    pub(super) field: FieldReport,
+    pub(super) compare: compare::Report,
+    /// Seam visibility of the second tile.
+    pub(super) companion_visibility: f64,
+    /// Row and column of the region in its interior.
+    pub(super) companion_origin: [usize; 2],
+    /// Measured tile, tile by the model, enlarged picture; all under the light of the comparison.
+    pub(super) greys: [Grey; 3],
+    /// Sum over clusters of the lesser of their shares in the tile and in the enlarged index.
+    pub(super) histogram_overlap: f64,
+    /// Clusters of the model that the enlarged index does not use.
+    pub(super) unused_clusters: usize,
+    /// Root mean square angle of the synthesised normals from their mean, degrees.
+    pub(super) synthesised_spread_deg: f64,
+    pub(super) ledger: Ledger,
+}
+
+/// First and second moments of a picture's grey (the mean of R, G and B), display levels 0..255.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grey {
+    pub(super) mean: f64,
+    /// Standard deviation.
+    pub(super) spread: f64,
+    /// Standard deviation of the means of squares of [`BLOCK`] texels a side.
+    pub(super) block_spread: f64,
+}
+
+impl Grey {
+    fn of(picture: &Picture) -> Self {
+        let bytes = picture.bytes();
+        let greys: Vec<f64> =
+            bytes.chunks_exact(3).map(|p| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0).collect();
+        let width = picture.size.width;
+        let block = |top: usize, left: usize| {
+            let rows = greys.chunks_exact(width).skip(top).take(BLOCK);
+            rows.flat_map(|row| &row[left..left + BLOCK]).sum::<f64>() / (BLOCK * BLOCK) as f64
+        };
+        let starts = |n: usize| (0..n / BLOCK).map(|k| k * BLOCK);
+        let blocks: Vec<f64> = starts(picture.size.height)
+            .flat_map(|top| starts(width).map(move |left| (top, left)))
+            .map(|(top, left)| block(top, left))
+            .collect();
+        let (mean, spread) = moments(&greys);
+        Self { mean, spread, block_spread: moments(&blocks).1 }
+    }
+}
+
+/// Mean and standard deviation.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
+}
+
+/// What is counted against what, bytes.
+pub(super) struct Ledger {
+    pub(super) representatives: u64,
+    pub(super) tile_index: u64,
+    pub(super) enlarged_index: u64,
+    pub(super) enlarged_texels: u64,
+    /// Raw samples of one texel under all pairs of directions.
+    pub(super) texel: u64,
+    pub(super) tile: u64,
+    pub(super) measurement: u64,
+    pub(super) enlarged: u64,
+    /// Bytes on disk of archive, measurement, model and enlarged index.
+    pub(super) on_disk: [u64; 4],
+}
+
+impl Figures {
+    /// Gathers the figures of the finished stages in `workshop`; `places` are archive, measurement,
+    /// model and enlarged index.
+    pub(super) fn gather(
+        workshop: &Workshop,
+        compare: compare::Report,
+        places: [&Path; 4],
+        context: &Context<'_>,
+    ) -> Result<Self> {
+        let model = &workshop.model;
+        let cluster: cluster::Report = model.report(Stage::Cluster)?;
+        let reference = [Subject::Tile, Subject::Modelled, Subject::ENLARGED];
+        let mut greys = Vec::with_capacity(reference.len());
+        for subject in reference {
+            greys.push(Grey::of(&workshop.picture(subject, context)?));
+        }
+        let shares = [&workshop.tile_index, &workshop.enlarged_index].map(|i| shares(i, cluster.clusters));
+        let [in_tile, in_enlarged] = &shares;
+        let texel = workshop.texel_bytes();
+        let enlarged_texels = workshop.enlarged_index.len() as u64;
+        let ledger = Ledger {
+            representatives: cluster.representative_bytes,
+            tile_index: cluster.index_bytes,
+            enlarged_index: enlarged_texels * if cluster.clusters <= 256 { 1 } else { 2 },
+            enlarged_texels,
+            texel,
+            tile: cluster.tile_bytes,
+            measurement: cluster.measurement_bytes,
+            enlarged: enlarged_texels * texel,
+            on_disk: [
+                bytes_below(places[0])?,
+                bytes_below(places[1])?,
+                bytes_below(places[2])?,
+                bytes_below(places[3])?,
+            ],
+        };
+        Ok(Self {
+            tile: model.report(Stage::Tile)?,
+            normals: model.report(Stage::Normals)?,
+            field: model.report(Stage::Fit)?,
+            compare,
+            companion_visibility: seam_visibility(&workshop.features, &workshop.companion.tile),
+            companion_origin: workshop.companion.origin,
+            greys: [greys[0], greys[1], greys[2]],
+            histogram_overlap: in_tile.iter().zip(in_enlarged).map(|(a, b)| a.min(*b)).sum(),
+            unused_clusters: in_enlarged.iter().filter(|&&share| share == 0.0).count(),
+            synthesised_spread_deg: spread_deg(&workshop.synthesised_normals()?),
+            ledger,
+            cluster,
+        })
+    }
+}
+
+/// Share of the texels that each cluster has.
+fn shares(index: &[u16], clusters: usize) -> Vec<f64> {
+    let mut counts = vec![0u64; clusters];
+    for &cluster in index {
+        if let Some(count) = counts.get_mut(usize::from(cluster)) {
+            *count += 1;
+        }
+    }
+    counts.into_iter().map(|count| count as f64 / index.len().max(1) as f64).collect()
+}
+
+/// Root mean square angle between a normal and the mean normal, degrees.
+fn spread_deg(normals: &[[f32; 3]]) -> f64 {
+    let count = normals.len().max(1) as f64;
+    let mean: [f64; 3] =
+        std::array::from_fn(|axis| normals.iter().map(|n| f64::from(n[axis])).sum::<f64>() / count);
+    let length = mean.iter().map(|m| m * m).sum::<f64>().sqrt();
+    let squared = |normal: &[f32; 3]| {
+        let cosine: f64 = normal.iter().zip(mean).map(|(&n, m)| f64::from(n) * m / length).sum();
+        cosine.clamp(-1.0, 1.0).acos().to_degrees().powi(2)
+    };
+    (normals.iter().map(squared).sum::<f64>() / count).sqrt()
+}
+
+/// Bytes of a file, or of all files in a folder.
+fn bytes_below(path: &Path) -> Result<u64> {
+    let failed = |error| Error::io("read", path, error);
+    let found = std::fs::metadata(path).map_err(failed)?;
+    if !found.is_dir() {
+        return Ok(found.len());
+    }
+    let mut total = 0;
+    for entry in std::fs::read_dir(path).map_err(failed)? {
+        total += bytes_below(&entry.map_err(failed)?.path())?;
+    }
+    Ok(total)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::shape::Size;
+
+    #[test]
+    fn greys_of_a_plane_with_a_bright_corner() {
+        // A quarter at 200, the rest a fine pattern of 0 and 100.
+        let pixel = |n: usize| {
+            let (y, x) = (n / 128, n % 128);
+            let level = if y < 32 && x < 64 { 200.0 } else { 100.0 * ((y + x) % 2) as f32 };
+            [level / 255.0; 3]
+        };
+        let picture = Picture::display(Size::new(64, 128), (0..64 * 128).map(pixel).collect());
+        let grey = Grey::of(&picture);
+        assert!((grey.mean - 87.5).abs() < 1e-9, "{grey:?}");
+        // A quarter of the squares has the mean 200, the others 50.
+        let between = 150.0 * (0.25f64 * 0.75).sqrt();
+        assert!((grey.block_spread - between).abs() < 1e-9, "{grey:?}");
+        assert!((grey.spread - (between.powi(2) + 0.75 * 50.0f64.powi(2)).sqrt()).abs() < 1e-9, "{grey:?}");
+    }
+
+    #[test]
+    fn shares_count_texels_of_clusters() {
+        assert_eq!(shares(&[0, 2, 2, 2], 4), [0.25, 0.0, 0.75, 0.0]);
+    }
+
+    #[test]
+    fn spread_of_two_normals_is_half_the_angle_between_them() {
+        let normal = |degrees: f64| {
+            let angle = degrees.to_radians();
+            [angle.sin() as f32, 0.0, angle.cos() as f32]
+        };
+        assert!((spread_deg(&[normal(-20.0), normal(30.0)]) - 25.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn bytes_of_a_folder_are_those_of_its_files() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("c")).unwrap();
+        std::fs::write(folder.path().join("a"), [0; 7]).unwrap();
+        std::fs::write(folder.path().join("c/b"), [0; 5]).unwrap();
+        assert_eq!(bytes_below(folder.path()).unwrap(), 12);
+    }
+}

@@ -33,9 +33,9 @@ pub(super) struct Enlarge {
     /// Keep the synthesised normals beside the index
     #[arg(long)]
     keep_normals: bool,
-    /// Rows treated at a time; changes memory, not the result
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    band: u32,
+    /// Rows treated at a time; changes memory, not the result [default: as many as fit 64 MiB]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    band: Option<u32>,
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
@@ -50,7 +50,7 @@ impl Enlarge {
             seed: self.seed,
             candidates: self.candidates,
             keep_normals: self.keep_normals,
-            band_rows: self.band as usize,
+            band_rows: self.band.map(|rows| rows as usize),
         })?;
         if self.dry_run {
             return tell.plan(&plan.summary());

@@ -232,7 +232,7 @@ fn enlarge(
         seed: settings.seed,
         candidates: settings.candidates,
         keep_normals: true,
-        band_rows: 32,
+        band_rows: None,
     };
     let found = Enlarged::open(output).is_ok_and(|e| (0..e.shard_rows()).all(|row| e.has_shard_row(row)));
     times.time("enlarge", found, || enlarge::plan(&options)?.run(context).map(|_| ()))

@@ -117,7 +117,7 @@ impl Plan {
             "stage": "cluster",
             "model": self.options.model,
             "texels": self.tile.size.texels(),
-            "memory_bytes": self.memory_bytes(),
+            "memory_bytes_one_thread": self.memory_bytes(1),
             "recipe": self.recipe,
         })
     }
@@ -127,9 +127,15 @@ impl Plan {
         Arrangement::new(&description.views, description.lights.len())
     }
 
-    fn memory_bytes(&self) -> u64 {
-        let window = self.tile.bounds().size.texels() * self.measurement.description().lights.len();
-        (self.tile.size.texels() * self.arrangement().stride() + 2 * window) as u64
+    /// Vectors of all texels, windows decoded by each thread, representatives, and the program itself.
+    fn memory_bytes(&self, threads: usize) -> u64 {
+        const PROGRAM_BYTES: usize = 16 << 20;
+        let description = self.measurement.description();
+        let texel_bytes = description.lights.len() * description.channels;
+        let window = self.tile.bounds().size.texels() * texel_bytes;
+        let representatives = self.options.clusters * description.views.len() * texel_bytes;
+        let vectors = self.tile.size.texels() * self.arrangement().stride();
+        (vectors + threads * 3 * window + 2 * representatives + PROGRAM_BYTES) as u64
     }
 
     /// Clusters the tile, unless that is done.
@@ -137,11 +143,12 @@ impl Plan {
         if self.model.is_done(Stage::Cluster, &self.recipe)? {
             return self.model.report(Stage::Cluster);
         }
-        if self.memory_bytes() > context.memory_bytes {
+        let needed = self.memory_bytes(context.threads);
+        if needed > context.memory_bytes {
             return Err(Error::usage(format!(
                 "clustering {} texels takes {} MiB of memory, {} MiB are allowed",
                 self.tile.size.texels(),
-                self.memory_bytes() >> 20,
+                needed >> 20,
                 context.memory_bytes >> 20
             ))
             .hint("this version clusters in memory: choose a smaller --tile or a larger --memory"));

@@ -18,6 +18,9 @@ use crate::store::model::{Model, Stage};
 use crate::texel::nearest::{NearestNormals, Neighbour};
 use crate::texel::scan::Scan;
 
+/// Bytes of candidates and normals in a band, unless its rows are given.
+const BAND_BYTES: usize = 64 << 20;
+
 /// How to enlarge.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -33,8 +36,8 @@ pub struct Options {
     pub candidates: usize,
     /// Write the synthesised normals too.
     pub keep_normals: bool,
-    /// Rows whose candidates are sought at a time; changes no byte.
-    pub band_rows: usize,
+    /// Rows whose candidates are sought at a time; as many as fit 64 MiB where absent. Changes no byte.
+    pub band_rows: Option<usize>,
 }
 
 /// An enlargement, ready to run.
@@ -106,11 +109,20 @@ impl Plan {
         self.options.size.texels() as u64 * if self.description.clusters > 256 { 2 } else { 1 }
     }
 
-    fn memory_bytes(&self) -> usize {
+    fn band_row_bytes(&self) -> usize {
+        self.options.size.width * (size_of::<Neighbour>() * self.options.candidates + size_of::<[f32; 3]>())
+    }
+
+    fn band_rows(&self) -> usize {
+        self.options.band_rows.unwrap_or(BAND_BYTES / self.band_row_bytes()).clamp(1, SHARD_SIDE)
+    }
+
+    /// Band, row of shards, and about twenty rows of three levels' fields in f64.
+    fn memory_bytes(&self) -> u64 {
         let width = self.options.size.width;
-        let band = self.options.band_rows * width * (size_of::<Neighbour>() * self.options.candidates + 12);
         let shards = SHARD_SIDE * width * if self.options.keep_normals { 14 } else { 2 };
-        band + shards
+        let field = 20 * 2 * width * 3 * size_of::<f64>();
+        (self.band_rows() * self.band_row_bytes() + shards + field) as u64
     }
 
     /// Makes the rows of shards that are not there yet.
@@ -119,6 +131,14 @@ impl Plan {
     /// candidates are only sought for rows of shards that are missing.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Size { height, width } = self.options.size;
+        if self.memory_bytes() > context.memory_bytes {
+            return Err(Error::usage(format!(
+                "an enlargement {width} texels wide takes {} MiB of memory, {} MiB are allowed",
+                self.memory_bytes() >> 20,
+                context.memory_bytes >> 20
+            ))
+            .hint("choose a lower --band or a larger --memory"));
+        }
         // All that can fail for the model's sake comes before the output is begun.
         let normals = NearestNormals::new(&self.model.normals()?);
         let scan = Scan::new(self.model.index()?, self.model.distance()?);
@@ -149,8 +169,8 @@ impl Plan {
             let rows = SHARD_SIDE.min(height - shard_row * SHARD_SIDE);
             let mut index = Vec::with_capacity(rows * width);
             let mut kept = Vec::new();
-            for first in (0..rows).step_by(self.options.band_rows) {
-                let band_rows = self.options.band_rows.min(rows - first);
+            for first in (0..rows).step_by(self.band_rows()) {
+                let band_rows = self.band_rows().min(rows - first);
                 let band = synthesise(&mut field, band_rows, width, context)?;
                 let candidates = context.install(|| self.candidates(&normals, &band))?;
                 for candidates in candidates.chunks_exact(width * self.options.candidates) {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::random::Hash;
 use crate::texel::seam::least_path;
-use crate::texel::tile::{Cut, Features, Patch, Tile};
+use crate::texel::tile::{Cut, Features, Patch, Tile, path_cost};
 
 /// Regions drawn, of which the half that shares least with the first tile is tried.
 const DRAWN: u32 = 1000;
@@ -62,18 +62,11 @@ impl Border {
         let Patch { height, width, overlap, .. } = first.patch;
         let mut cost = 0;
         let mut side = |length: usize, place: &dyn Fn(usize, usize) -> (usize, usize)| {
-            let differences: Vec<u64> = (0..length * overlap)
-                .map(|n| {
-                    let (row, column) = place(n / overlap, n % overlap);
-                    let ours = first.tile.source[row * width + column].map(|n| n as usize);
-                    difference(features, ours, [y + row, x + column])
-                })
-                .collect();
-            // Cutting between depths d and d + 1 costs what the two differ by at both.
-            let cuts: Vec<u64> = differences
-                .chunks_exact(overlap)
-                .flat_map(|depths| depths.windows(2).map(|pair| pair[0] + pair[1]))
-                .collect();
+            let cuts = path_cost(length, overlap, |step, depth| {
+                let (row, column) = place(step, depth);
+                let ours = first.tile.source[row * width + column].map(|n| n as usize);
+                features.difference(ours, [y + row, x + column])
+            });
             let (path, total) = least_path(&cuts, length, overlap - 1, false);
             cost += total;
             path.into_iter().map(|depth| depth + 1).collect::<Vec<usize>>()
@@ -84,16 +77,6 @@ impl Border {
         let bottom = side(width, &|column, depth| (height - 1 - depth, column));
         Self { left, right, top, bottom, cost }
     }
-}
-
-/// Sum of squared differences of two texels of the measurement.
-fn difference(features: &Features, first: [usize; 2], second: [usize; 2]) -> u64 {
-    let texel = |[row, column]: [usize; 2]| {
-        let at = (row * features.size.width + column) * features.count;
-        &features.codes[at..at + features.count]
-    };
-    let pairs = texel(first).iter().zip(texel(second));
-    u64::from(pairs.map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum::<u32>())
 }
 
 /// The first tile outside the paths, the region inside all four.

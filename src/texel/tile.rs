@@ -67,7 +67,7 @@ impl Features {
     }
 
     /// Sum of squared differences of two texels.
-    fn difference(&self, first: [usize; 2], second: [usize; 2]) -> u64 {
+    pub(super) fn difference(&self, first: [usize; 2], second: [usize; 2]) -> u64 {
         let pairs = self.texel(first).iter().zip(self.texel(second));
         u64::from(pairs.map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum::<u32>())
     }
@@ -135,7 +135,7 @@ fn vertical_path(features: &Features, patch: Patch) -> (Vec<usize>, u64) {
 }
 
 /// Cost of cutting between places p and p + 1: how far the two sides differ at both.
-fn path_cost(length: usize, overlap: usize, difference: impl Fn(usize, usize) -> u64) -> Vec<u64> {
+pub(super) fn path_cost(length: usize, overlap: usize, difference: impl Fn(usize, usize) -> u64) -> Vec<u64> {
     let mut cost = Vec::with_capacity(length * (overlap - 1));
     for step in 0..length {
         let mut before = difference(step, 0);

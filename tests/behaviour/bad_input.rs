@@ -233,7 +233,7 @@ fn no_flipped_bit_of_a_store_brings_the_reader_down() {
                 Err(_) => refused += 1,
                 // Samples are covered by checksums: what is read of a harmed shard must be the truth.
                 Ok(found) if file.starts_with("reflectance/c") => {
-                    assert!(found == truth, "{file}, byte {at}")
+                    assert!(found == truth, "{file}, byte {at}");
                 }
                 Ok(_) => {}
             }

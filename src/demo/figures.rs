@@ -6,8 +6,10 @@ use crate::demo::pictures::{Subject, Workshop};
 use crate::error::{Error, Result};
 use crate::picture::Picture;
 use crate::run::Context;
+use crate::stage::normals::mean_and_spread;
 use crate::stage::{cluster, compare, normals, tile};
-use crate::store::model::{FieldReport, Stage};
+use crate::store::field::FieldReport;
+use crate::store::model::Stage;
 use crate::texel::tile::seam_visibility;
 
 /// Side of the squares whose means tell how patchy a picture is, texels.
@@ -133,7 +135,7 @@ impl Figures {
             greys: [greys[0], greys[1], greys[2]],
             histogram_overlap: in_tile.iter().zip(in_enlarged).map(|(a, b)| a.min(*b)).sum(),
             unused_clusters: in_enlarged.iter().filter(|&&share| share == 0.0).count(),
-            synthesised_spread_deg: spread_deg(&workshop.synthesised_normals()?),
+            synthesised_spread_deg: mean_and_spread(&workshop.synthesised_normals()?).1,
             ledger,
             cluster,
         })
@@ -149,19 +151,6 @@ fn shares(index: &[u16], clusters: usize) -> Vec<f64> {
         }
     }
     counts.into_iter().map(|count| count as f64 / index.len().max(1) as f64).collect()
-}
-
-/// Root mean square angle between a normal and the mean normal, degrees.
-fn spread_deg(normals: &[[f32; 3]]) -> f64 {
-    let count = normals.len().max(1) as f64;
-    let mean: [f64; 3] =
-        std::array::from_fn(|axis| normals.iter().map(|n| f64::from(n[axis])).sum::<f64>() / count);
-    let length = mean.iter().map(|m| m * m).sum::<f64>().sqrt();
-    let squared = |normal: &[f32; 3]| {
-        let cosine: f64 = normal.iter().zip(mean).map(|(&n, m)| f64::from(n) * m / length).sum();
-        cosine.clamp(-1.0, 1.0).acos().to_degrees().powi(2)
-    };
-    (normals.iter().map(squared).sum::<f64>() / count).sqrt()
 }
 
 /// Bytes of a file, or of all files in a folder.
@@ -212,7 +201,7 @@ mod tests {
             let angle = degrees.to_radians();
             [angle.sin() as f32, 0.0, angle.cos() as f32]
         };
-        assert!((spread_deg(&[normal(-20.0), normal(30.0)]) - 25.0).abs() < 1e-4);
+        assert!((mean_and_spread(&[normal(-20.0), normal(30.0)]).1 - 25.0).abs() < 1e-4);
     }
 
     #[test]

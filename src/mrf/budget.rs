@@ -1,8 +1,7 @@
 //! How many pyramid levels and neighbours a field can carry: samples against parameters.
 
 use super::car::Positions;
-use super::fit::Options;
-use super::model::Kind;
+use super::model::{Kind, Options};
 use super::{neighbourhood, pyramid};
 use crate::error::{Error, Result};
 

@@ -6,26 +6,13 @@ use nalgebra::DMatrix;
 use super::budget::{affords, balance, joint_channels, level_count};
 use super::car::{Moments, Positions, Posterior, Prior};
 use super::field::{Boundary, Field};
-use super::model::{Kind, Level, Model};
+use super::model::{Kind, Level, Model, Options};
 use super::stability::STABLE_RADIUS;
 use super::{karhunen_loeve, neighbourhood, pyramid};
 use crate::error::{Error, Result};
 
 /// Factor by which a field that no neighbourhood makes stable is damped, again and again.
 const DAMPING: f64 = 0.95;
-
-/// What to fit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// Channels together or one by one.
-    pub kind: Kind,
-    /// Pyramid levels; `None` takes as many as keep ten samples per parameter at the coarsest for four neighbours,
-    /// at least 1 and at most 5.
-    pub levels: Option<usize>,
-    /// Periodic for a tile that wraps. Otherwise the pyramid is mirrored, and only texels whose neighbours all lie
-    /// inside count for the statistics.
-    pub boundary: Boundary,
-}
 
 /// Fits a model to a field of any number of channels.
 ///

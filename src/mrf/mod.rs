@@ -22,6 +22,6 @@ pub mod stability;
 pub mod synthesis;
 
 pub use field::{Boundary, Field};
-pub use fit::{Options, fit};
-pub use model::{Kind, Level, Model};
+pub use fit::fit;
+pub use model::{Kind, Level, Model, Options};
 pub use synthesis::Synthesis;

@@ -3,6 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::car::{Prior, cholesky};
+use super::field::Boundary;
 use super::stability::{self, STABLE_RADIUS};
 use crate::error::{Error, Result};
 
@@ -16,6 +17,19 @@ pub enum Kind {
     Car3d,
     /// 2D CAR, (18): one scalar model a channel, after the Karhunen-Loeve transformation.
     Car2d,
+}
+
+/// What to fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// Channels together or one by one.
+    pub kind: Kind,
+    /// Pyramid levels; `None` takes as many as keep ten samples per parameter at the coarsest for four neighbours,
+    /// at least 1 and at most 5.
+    pub levels: Option<usize>,
+    /// Periodic for a tile that wraps. Otherwise the pyramid is mirrored, and only texels whose neighbours all lie
+    /// inside count for the statistics.
+    pub boundary: Boundary,
 }
 
 /// A field model: mean, transformation, and one causal autoregressive field a pyramid level.

@@ -30,6 +30,9 @@ pub enum Kind {
     Leather,
 }
 
+/// How far around a texel the openness looks, texels.
+const HORIZON: f32 = 18.0;
+
 /// What a material is at one place of the mean plane. Lengths in units of the
 /// material, which [`Surface`] scales to texels.
 #[derive(Clone, Copy, Debug)]

@@ -3,9 +3,9 @@
 
 use rayon::prelude::*;
 
+use super::HORIZON;
 use super::leather::Leather;
 use super::noise::DOMAIN;
-use super::visibility::HORIZON;
 use super::wood::Wood;
 use super::{Kind, Material, Matter};
 use crate::error::{Error, Result};

@@ -1,10 +1,8 @@
 //! What the relief hides: shadows with a soft edge, the openness of hollows
 //! to the sky, and the point that a view ray meets.
 
+use super::HORIZON;
 use super::surface::Surface;
-
-/// How far around a texel the openness looks, texels.
-pub(super) const HORIZON: f32 = 18.0;
 
 /// Heights over the padded plane, bilinear between texel centres. Positions are
 /// (column, row) of padded texels, whole at texel centres.

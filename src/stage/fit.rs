@@ -8,7 +8,8 @@ use crate::error::Result;
 use crate::mrf::{self, Boundary, Field};
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::store::model::{FieldReport, Model, Stage};
+use crate::store::field::FieldReport;
+use crate::store::model::{Model, Stage};
 
 /// How to fit.
 #[derive(Clone, Debug)]

@@ -78,7 +78,8 @@ impl Plan {
         let plane = self.normals_of_window(&stereo, view, tile.bounds(), context)?;
         let normals: Vec<[f32; 3]> = tile.offsets_in_bounds().into_iter().map(|at| plane[at]).collect();
         self.model.write_normals(tile.size, &normals)?;
-        let report = report(view, description.lights.len(), &normals);
+        let (mean, spread_deg) = mean_and_spread(&normals);
+        let report = Report { view, lights: description.lights.len(), mean, spread_deg };
         self.model.finish(Stage::Normals, &self.recipe, &report)?;
         Ok(report)
     }
@@ -128,7 +129,8 @@ pub(crate) fn frontal_view(measurement: &Measurement) -> usize {
     (0..views.len()).min_by(|&a, &b| views[a].theta_rad.total_cmp(&views[b].theta_rad)).unwrap_or(0)
 }
 
-fn report(view: usize, lights: usize, normals: &[[f32; 3]]) -> Report {
+/// Mean of unit normals, and their root mean square angle from it in degrees.
+pub(crate) fn mean_and_spread(normals: &[[f32; 3]]) -> ([f64; 3], f64) {
     let count = normals.len().max(1) as f64;
     let mean: [f64; 3] =
         std::array::from_fn(|axis| normals.iter().map(|n| f64::from(n[axis])).sum::<f64>() / count);
@@ -137,6 +139,5 @@ fn report(view: usize, lights: usize, normals: &[[f32; 3]]) -> Report {
         let cosine: f64 = normal.iter().zip(mean).map(|(&n, m)| f64::from(n) * m / length).sum();
         cosine.clamp(-1.0, 1.0).acos().to_degrees().powi(2)
     };
-    let spread_deg = (normals.iter().map(squared).sum::<f64>() / count).sqrt();
-    Report { view, lights, mean, spread_deg }
+    (mean, (normals.iter().map(squared).sum::<f64>() / count).sqrt())
 }

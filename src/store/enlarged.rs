@@ -5,9 +5,8 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
-use crate::run::recipe;
 use crate::shape::{Size, Window};
-use crate::store::{Array, FORMAT, Layout, Named, Store};
+use crate::store::{Array, Layout, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
@@ -42,20 +41,7 @@ impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
     pub fn create(path: &Path, description: &Description, recipe: &Value) -> Result<Self> {
         let store = Store::at(path);
-        match store.attributes()? {
-            Some(found) => {
-                store.expect(KIND)?;
-                recipe::expect_same(path, &found, recipe)?;
-                store.sweep()?;
-            }
-            None => {
-                let value = json!({
-                    "kind": KIND, "format": FORMAT, "version": env!("CARGO_PKG_VERSION"),
-                    "recipe": recipe, "digest": recipe::digest(recipe),
-                });
-                store.write_group("", value.as_object().cloned().unwrap_or_default())?;
-            }
-        }
+        store.begin(KIND, recipe, &json!({}))?;
         let wide = description.clusters > 256;
         let index = if wide {
             create::<u16>(&store, description.size)

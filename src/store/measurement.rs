@@ -16,7 +16,7 @@ use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::shape::{Size, Window};
-use crate::store::{Array, FORMAT, Layout, Store};
+use crate::store::{Array, Layout, Store};
 use crate::texel::direction::Direction;
 
 /// The attribute `kind` of a measurement store.
@@ -90,14 +90,8 @@ impl Measurement {
         limit_bytes: usize,
     ) -> Result<Self> {
         let store = Store::at(path);
-        match store.attributes()? {
-            Some(found) => {
-                store.expect(KIND)?;
-                recipe::expect_same(path, &found, recipe)?;
-                store.sweep()?;
-            }
-            None => store.write_group("", attributes(&description, recipe))?,
-        }
+        let radiometry = "apparent reflectance, cosine of the light angle included";
+        store.begin(KIND, recipe, &json!({"radiometry": radiometry, "transfer": description.transfer}))?;
         write_directions(&store, "view_direction", "view", &description.views)?;
         write_directions(&store, "light_direction", "light", &description.lights)?;
         let side = description.shard_side(limit_bytes);
@@ -242,19 +236,6 @@ impl Measurement {
             &[1, size.height as u64, size.width as u64, self.description.lights.len() as u64],
         )
     }
-}
-
-fn attributes(description: &Description, recipe: &Value) -> Map<String, Value> {
-    let value = json!({
-        "kind": KIND,
-        "format": FORMAT,
-        "version": env!("CARGO_PKG_VERSION"),
-        "radiometry": "apparent reflectance, cosine of the light angle included",
-        "transfer": description.transfer,
-        "recipe": recipe,
-        "digest": recipe::digest(recipe),
-    });
-    value.as_object().cloned().unwrap_or_default()
 }
 
 fn create_reflectance(store: &Store, description: &Description, side: usize) -> Result<Array> {

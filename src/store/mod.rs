@@ -3,6 +3,7 @@
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
 pub mod enlarged;
+pub mod field;
 pub mod mapped;
 pub mod measurement;
 pub mod model;
@@ -18,6 +19,7 @@ use zarrs::array::{
 };
 
 use crate::error::{Error, Kind, Result};
+use crate::run::recipe;
 use mapped::MappedStorage;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
@@ -133,6 +135,31 @@ impl Store {
             Some(FORMAT) => Ok(Some(ours.clone())),
             format => Err(damaged(format!("got layout format {format:?}, expected {FORMAT}"))),
         }
+    }
+
+    /// Begins a store of this kind, or goes on with the one that the same recipe began; `more` are
+    /// attributes beside the recipe.
+    ///
+    /// # Errors
+    /// [`Kind::Recipe`] where another recipe's store lies there.
+    pub fn begin(&self, kind: &str, recipe: &Value, more: &Value) -> Result<()> {
+        if let Some(found) = self.attributes()? {
+            self.expect(kind)?;
+            recipe::expect_same(&self.path, &found, recipe)?;
+            return self.sweep();
+        }
+        let mut attributes = json!({
+            "kind": kind,
+            "format": FORMAT,
+            "version": env!("CARGO_PKG_VERSION"),
+            "recipe": recipe,
+            "digest": recipe::digest(recipe),
+        });
+        let attributes = attributes.as_object_mut().map(std::mem::take).unwrap_or_default();
+        self.write_group(
+            "",
+            attributes.into_iter().chain(more.as_object().cloned().unwrap_or_default()).collect(),
+        )
     }
 
     fn occupied(&self) -> Error {

@@ -5,16 +5,14 @@
 
 use std::path::Path;
 
-use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::mrf::car::Prior;
-use crate::mrf::{Kind as FieldKind, Level, Model as FieldModel};
+use crate::mrf::Model as FieldModel;
 use crate::run::recipe;
 use crate::shape::Size;
+use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
 use crate::store::{FORMAT, Layout, Named, Store};
 use crate::texel::direction::Direction;
@@ -265,140 +263,13 @@ impl Model {
     }
 
     /// Writes the random field model under `mrf/`.
-    pub fn write_field(&self, field: &FieldModel) -> Result<()> {
-        self.store.write_group("mrf", Map::new())?;
-        let channels = field.mean.len();
-        self.store.write("mrf/mean", &Layout::small::<f64>(&["channel"], &[channels]), &field.mean)?;
-        if let Some(transform) = &field.transform {
-            let layout = Layout::small::<f64>(&["component", "channel"], &[channels, channels]);
-            self.store.write("mrf/transform", &layout, &rows(transform))?;
-        }
-        for (number, level) in field.levels.iter().enumerate() {
-            let group = format!("mrf/level_{number}");
-            self.store.write_group(&group, Map::new())?;
-            let layout = Layout::small::<f64>(
-                &["channel", "coefficient"],
-                &[level.gamma.nrows(), level.gamma.ncols()],
-            );
-            self.store.write(&format!("{group}/gamma"), &layout, &rows(&level.gamma))?;
-            let layout = match field.kind {
-                FieldKind::Car3d => {
-                    Layout::small::<f64>(&["channel", "channel_other"], &[channels, channels])
-                }
-                FieldKind::Car2d => Layout::small::<f64>(&["channel"], &[channels]),
-            };
-            self.store.write(&format!("{group}/sigma"), &layout, &rows(&level.sigma))?;
-            let sites: Vec<i32> = level.neighbourhood.iter().flatten().copied().collect();
-            let layout = Layout::small::<i32>(&["site", "dy_dx"], &[level.neighbourhood.len(), 2]);
-            self.store.write(&format!("{group}/neighbourhood"), &layout, &sites)?;
-        }
-        Ok(())
+    pub fn write_field(&self, model: &FieldModel) -> Result<()> {
+        field::write(&self.store, model)
     }
 
     /// The random field model.
     pub fn field(&self) -> Result<FieldModel> {
-        let report: FieldReport = self.report(Stage::Fit)?;
-        let (_, mean) = self.store.read::<f64>("mrf/mean", &[0])?;
-        let channels = mean.len();
-        let kind = report.kind();
-        let transform = match kind {
-            FieldKind::Car3d => None,
-            FieldKind::Car2d => {
-                let (_, values) = self.store.read::<f64>("mrf/transform", &[channels, channels])?;
-                Some(DMatrix::from_row_slice(channels, channels, &values))
-            }
-        };
-        let levels = report
-            .levels
-            .iter()
-            .enumerate()
-            .map(|(number, report)| self.level(number, kind, channels, report))
-            .collect::<Result<Vec<Level>>>()?;
-        let field = FieldModel { kind, mean, transform, levels };
-        field.check().map_err(|error| error.context(self.path().display()))?;
-        Ok(field)
-    }
-
-    fn level(&self, number: usize, kind: FieldKind, channels: usize, report: &LevelReport) -> Result<Level> {
-        let group = format!("mrf/level_{number}");
-        let (_, sites) = self.store.read::<i32>(&format!("{group}/neighbourhood"), &[0, 2])?;
-        let neighbourhood: Vec<[i32; 2]> = sites.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
-        let (columns, sigma_shape) = match kind {
-            FieldKind::Car3d => (channels * neighbourhood.len(), vec![channels, channels]),
-            FieldKind::Car2d => (neighbourhood.len(), vec![channels]),
-        };
-        let (_, gamma) = self.store.read::<f64>(&format!("{group}/gamma"), &[channels, columns])?;
-        let (_, sigma) = self.store.read::<f64>(&format!("{group}/sigma"), &sigma_shape)?;
-        Ok(Level {
-            neighbourhood,
-            gamma: DMatrix::from_row_slice(channels, columns, &gamma),
-            sigma: DMatrix::from_row_slice(channels, sigma.len() / channels, &sigma),
-            prior: Prior {
-                xx: report.prior_v_xx,
-                yy: report.prior_v_yy,
-                beta: report.prior_beta,
-                degrees: report.prior_degrees,
-            },
-            log_evidence: report.log_evidence,
-            radius: report.radius,
-            size: report.size,
-            note: report.note.clone(),
-        })
-    }
-}
-
-/// What the attributes of stage `fit` tell of the field, beside its arrays.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FieldReport {
-    /// `3d` or `2d`.
-    pub mrf: String,
-    /// Level 0 is the finest.
-    pub levels: Vec<LevelReport>,
-}
-
-/// One level of a [`FieldReport`].
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LevelReport {
-    /// Height and width of the level that was fitted.
-    pub size: [usize; 2],
-    /// Number of sites of the neighbourhood.
-    pub eta: usize,
-    /// Log evidence of that neighbourhood.
-    pub log_evidence: f64,
-    /// Spectral radius of the recursion; below 1 is stable.
-    pub radius: f64,
-    /// What had to be done to make it stable.
-    pub note: Option<String>,
-    /// Diagonal of V_XX(0).
-    pub prior_v_xx: f64,
-    /// Diagonal of V_YY(0).
-    pub prior_v_yy: f64,
-    /// beta(0).
-    pub prior_beta: f64,
-    /// Degrees of freedom of the inverse Wishart prior, for the evidence.
-    pub prior_degrees: f64,
-}
-
-impl FieldReport {
-    /// The report of a fitted field.
-    pub fn new(field: &FieldModel) -> Self {
-        let level = |level: &Level| LevelReport {
-            size: level.size,
-            eta: level.neighbourhood.len(),
-            log_evidence: level.log_evidence,
-            radius: level.radius,
-            note: level.note.clone(),
-            prior_v_xx: level.prior.xx,
-            prior_v_yy: level.prior.yy,
-            prior_beta: level.prior.beta,
-            prior_degrees: level.prior.degrees,
-        };
-        let mrf = if field.kind == FieldKind::Car2d { "2d" } else { "3d" };
-        Self { mrf: mrf.to_owned(), levels: field.levels.iter().map(level).collect() }
-    }
-
-    fn kind(&self) -> FieldKind {
-        if self.mrf == "2d" { FieldKind::Car2d } else { FieldKind::Car3d }
+        field::read(&self.store, &self.report(Stage::Fit)?)
     }
 }
 
@@ -410,11 +281,6 @@ pub struct Representatives {
     pub samples: Vec<u8>,
     /// Their transfer curve.
     pub transfer: Transfer,
-}
-
-/// Elements of a matrix row by row.
-fn rows(matrix: &DMatrix<f64>) -> Vec<f64> {
-    matrix.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()).collect()
 }
 
 /// Writes an index [y, x] as u8 or u16 by the number of clusters.

@@ -117,7 +117,7 @@ impl Archive {
     }
 }
 
-/// Files below a folder, sorted by their paths relative to it. Symbolic links are not followed.
+/// Files below a folder, sorted by path. Links to files are followed, links to folders are not.
 fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];
@@ -125,11 +125,14 @@ fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
         let entries = fs::read_dir(&folder).map_err(|error| Error::io("list", &folder, error))?;
         for entry in entries {
             let entry = entry.map_err(|error| Error::io("list", &folder, error))?;
-            let kind = entry.file_type().map_err(|error| Error::io("read", &entry.path(), error))?;
-            if kind.is_dir() && depth < FOLDER_DEPTH {
-                folders.push((entry.path(), depth + 1));
-            } else if kind.is_file() {
-                files.push(entry.path());
+            let path = entry.path();
+            let linked = entry.file_type().is_ok_and(|kind| kind.is_symlink());
+            // A link that leads nowhere is no image; the hole that it leaves is reported as such.
+            let Ok(data) = fs::metadata(&path) else { continue };
+            if data.is_file() {
+                files.push(path);
+            } else if data.is_dir() && !linked && depth < FOLDER_DEPTH {
+                folders.push((path, depth + 1));
             }
         }
     }

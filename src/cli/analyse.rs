@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::mrf;
-use btfkit::picture::{Picture, false_color};
+use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::stage::{cluster, compare, fit, image, normals, tile};
 use btfkit::store::field::FieldReport;
@@ -355,6 +355,7 @@ fn tell_field(report: &FieldReport, tell: Tell) {
 
 impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        self.picture.as_deref().map(Ending::of).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let report = compare::run(&options, context)?;
         if self.json {
@@ -390,7 +391,7 @@ impl Compare {
         let colors = image::cluster_colors(&model, self.view, self.light)?;
         let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);
-        let factor = (384 / tile.size.height).max(1);
+        let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]
             .map(|picture| picture.magnified(factor));
         Ok(Picture::side_by_side(&shown, 8))

@@ -3,10 +3,10 @@ use std::path::PathBuf;
 use btfkit::demo;
 use btfkit::error::Result;
 use btfkit::run::Context;
-use btfkit::sample::Kind;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::Tell;
+use super::sample::Material;
 use super::table::{row, table};
 
 /// The whole method on a made material: sample, import, model, enlarge, pictures and a page
@@ -25,19 +25,10 @@ pub(super) struct Demo {
     material: Material,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Material {
-    Wood,
-    Leather,
-}
-
 impl Demo {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let kind = match self.material {
-            Material::Wood => Kind::Wood,
-            Material::Leather => Kind::Leather,
-        };
-        let report = demo::run(&demo::Options { folder: self.folder.clone(), kind }, context)?;
+        let options = demo::Options { folder: self.folder.clone(), kind: self.material.into() };
+        let report = demo::run(&options, context)?;
         let rows: Vec<_> =
             report.steps.iter().map(|step| row![step.name, format!("{:.2} s", step.seconds)]).collect();
         tell.line(table(&rows));

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use btfkit::error::Result;
+use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Window;
 use btfkit::stage::image;
@@ -16,7 +17,7 @@ Examples:
   btf image wood.zarr --light 15,0 --view 0,0 --out measured.png
   btf image wood-4k.zarr --light 60,90 --window 0,0,1024,1024 --out corner.exr
   btf image wood.model.zarr --what normals --out normals.png
-A measured pair of directions shows the stored samples exactly; others are mixed in linear light
+A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
 from the three views and three lights around them.")]
 pub(super) struct Image {
     /// A measurement, a model or an enlarged index
@@ -56,6 +57,7 @@ enum What {
 
 impl Image {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        Ending::of(&self.out)?;
         let subject = match self.what {
             What::Appearance => image::Subject::Appearance { view: self.view, light: self.light },
             What::Index => image::Subject::Index,

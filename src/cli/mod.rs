@@ -1,5 +1,4 @@
 //! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
-#![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod analyse;
 mod demo;
@@ -11,6 +10,7 @@ mod progress;
 mod sample;
 mod table;
 
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -105,32 +105,34 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
-    let context =
-        Context { progress: progress.as_ref(), stop: &stop, threads, memory_bytes: cli.common.memory };
-    let tell = Tell { quiet: cli.common.quiet };
-    let result = match &cli.command {
-        Command::Demo(command) => command.run(&context, tell),
-        Command::Sample(command) => command.run(&context, tell),
-        Command::Info(command) => command.run(tell),
-        Command::Import(command) => command.run(&context, tell),
-        Command::Model(command) => command.run(&context, tell),
-        Command::Tile(command) => command.run(&context, tell),
-        Command::Cluster(command) => command.run(&context, tell),
-        Command::Normals(command) => command.run(&context, tell),
-        Command::Fit(command) => command.run(&context, tell),
-        Command::Compare(command) => command.run(&context, tell),
-        Command::Enlarge(command) => command.run(&context, tell),
-        Command::Image(command) => command.run(&context, tell),
-    };
+    let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
+        .and_then(|context| cli.command.run(&context, Tell { quiet: cli.common.quiet }));
     progress.end();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("btf: {error}");
-            if let Some(hint) = error.guidance() {
-                eprintln!("  {hint}");
-            }
+            let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
+            let _ = writeln!(std::io::stderr(), "btf: {error}{hint}");
             ExitCode::from(exit_code(error.kind()))
+        }
+    }
+}
+
+impl Command {
+    fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        match self {
+            Self::Demo(command) => command.run(context, tell),
+            Self::Sample(command) => command.run(context, tell),
+            Self::Info(command) => command.run(tell),
+            Self::Import(command) => command.run(context, tell),
+            Self::Model(command) => command.run(context, tell),
+            Self::Tile(command) => command.run(context, tell),
+            Self::Cluster(command) => command.run(context, tell),
+            Self::Normals(command) => command.run(context, tell),
+            Self::Fit(command) => command.run(context, tell),
+            Self::Compare(command) => command.run(context, tell),
+            Self::Enlarge(command) => command.run(context, tell),
+            Self::Image(command) => command.run(context, tell),
         }
     }
 }
@@ -155,7 +157,8 @@ struct Tell {
 impl Tell {
     fn line(self, text: impl std::fmt::Display) {
         if !self.quiet {
-            println!("{text}");
+            // A closed pipe (`btf info x | head -1`) is no failure.
+            let _ = writeln!(std::io::stdout(), "{text}");
         }
     }
 

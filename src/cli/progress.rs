@@ -1,5 +1,6 @@
 //! Progress for people (bars with rate and time left) and for schedulers (JSON lines).
 
+use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -80,13 +81,11 @@ impl Step {
         let seconds = self.began.elapsed().as_secs_f64();
         let rate = self.done as f64 / seconds.max(1e-9);
         let left = (self.done > 0).then(|| self.total.saturating_sub(self.done) as f64 / rate);
-        eprintln!(
-            "{}",
-            serde_json::json!({
-                "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
-                "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
-            })
-        );
+        let line = serde_json::json!({
+            "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
+            "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
+        });
+        let _ = writeln!(std::io::stderr(), "{line}");
     }
 }
 

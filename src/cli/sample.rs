@@ -39,22 +39,28 @@ pub(super) struct Sample {
     scale: f64,
 }
 
+/// A material that can be made.
 #[derive(Clone, Copy, ValueEnum)]
-enum Material {
+pub(super) enum Material {
     Wood,
     Leather,
 }
 
+impl From<Material> for Kind {
+    fn from(material: Material) -> Self {
+        match material {
+            Material::Wood => Self::Wood,
+            Material::Leather => Self::Leather,
+        }
+    }
+}
+
 impl Sample {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let kind = match self.material {
-            Material::Wood => Kind::Wood,
-            Material::Leather => Kind::Leather,
-        };
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),
-                kind,
+                kind: self.material.into(),
                 size: self.size,
                 views: self.views,
                 lights: self.lights,

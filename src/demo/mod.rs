@@ -277,7 +277,7 @@ mod tests {
         };
         let folder = tempfile::tempdir().unwrap();
         let stop = AtomicBool::new(false);
-        let context = Context { progress: &Silent, stop: &stop, threads: 2, memory_bytes: 256 << 20 };
+        let context = Context::new(&Silent, &stop, 2, 256 << 20).unwrap();
         let first = run_with(&settings, folder.path(), &context).unwrap();
         let page = std::fs::read_to_string(&first.page).unwrap();
         let pictures = std::fs::read_dir(folder.path().join(names::PICTURES)).unwrap().count();

@@ -118,7 +118,7 @@ impl Workshop {
             let first = cut(&features, patch);
             let second = companion(&features, &first, seed);
             (first, second)
-        })?;
+        });
         let tile_index = model.index()?;
         let enlarged_index = enlarged.read(enlarged.size().window())?;
         Ok(Self { measurement, model, enlarged, features, cut, companion, tile_index, enlarged_index, seed })

@@ -24,6 +24,7 @@ pub enum Kernel {
     Plain,
     /// AVX2, 32 bytes at a time.
     #[cfg(target_arch = "x86_64")]
+    #[non_exhaustive] // so that only `available` can vouch for it
     Avx2,
 }
 

@@ -2,13 +2,12 @@
 
 pub mod false_color;
 
-use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use crate::color::srgb_encode_u8;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
-use crate::store::mapped::temporary_name;
+use crate::store::mapped::write_atomically;
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,37 +139,44 @@ impl Picture {
 
     /// Writes a PNG or an EXR file, by the ending of its name; it appears whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        let bytes = match ending.as_deref() {
-            Some("png") => self.png()?,
-            Some("exr") => self.exr()?,
-            _ => {
-                return Err(Error::usage(format!(
-                    "{}: expected a name that ends in .png (for displays) or .exr (linear values)",
-                    path.display()
-                )));
-            }
+        let bytes = match Ending::of(path)? {
+            Ending::Png => self.png()?,
+            Ending::Exr => self.exr()?,
         };
         write_file(path, &bytes)
     }
 }
 
+/// Formats of pictures, by the endings of their names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// 8-bit display values.
+    Png,
+    /// 32-bit float values.
+    Exr,
+}
+
+impl Ending {
+    /// The format that a name asks for.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Usage`] for any other ending.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        match ending.as_deref() {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(Error::usage(format!(
+                "{}: expected a name that ends in .png (for displays) or .exr (linear values)",
+                path.display()
+            ))),
+        }
+    }
+}
+
 /// Writes a file so that it appears whole or not at all.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    let failed = |error| Error::io("write", path, error);
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
-    }
-    let temporary = temporary_name(path);
-    let written = std::fs::File::create(&temporary).and_then(|file| {
-        let mut file = BufWriter::new(file);
-        file.write_all(bytes)?;
-        file.flush()
-    });
-    written.and_then(|()| std::fs::rename(&temporary, path)).map_err(|error| {
-        let _ = std::fs::remove_file(&temporary);
-        failed(error)
-    })
+    write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
 }
 
 #[cfg(test)]

@@ -20,20 +20,32 @@ pub struct Context<'a> {
     pub threads: usize,
     /// Resident memory that the work may use.
     pub memory_bytes: u64,
+    pool: rayon::ThreadPool,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Starts a pool of `threads` threads.
+    pub fn new(
+        progress: &'a dyn Progress,
+        stop: &'a AtomicBool,
+        threads: usize,
+        memory_bytes: u64,
+    ) -> Result<Self> {
+        let threads = threads.max(1);
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
+        Ok(Self { progress, stop, threads, memory_bytes, pool })
+    }
+
     /// An error of kind `Stopped` once a stop has been asked for.
     pub fn check_stop(&self) -> Result<()> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
     }
 
-    /// Runs `work` on a pool of [`Context::threads`] threads.
-    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> Result<T> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads.max(1))
-            .build()
-            .map_err(|error| Error::internal(format!("cannot start {} threads: {error}", self.threads)))?;
-        Ok(pool.install(work))
+    /// Runs `work` on the pool.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.pool.install(work)
     }
 }

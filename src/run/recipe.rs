@@ -10,6 +10,10 @@ use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
 
+/// Version of the methods, part of every recipe: raised when a change makes other bytes, so that a newer
+/// program does not go on with what an older one left half-made.
+pub const METHOD: u64 = 1;
+
 /// The digest of a recipe: SHA-256 of its JSON with sorted keys, in hexadecimal.
 pub fn digest(recipe: &Value) -> String {
     hexadecimal(&Sha256::digest(canonical(recipe).to_string().as_bytes()))

@@ -26,7 +26,7 @@ pub fn for_each<U: Sync, T: Send>(
     let failed = std::sync::atomic::AtomicBool::new(false);
     let results: Mutex<Vec<(usize, Result<T>)>> = Mutex::new(Vec::with_capacity(units.len()));
     std::thread::scope(|scope| {
-        for _ in 0..in_flight.max(1) {
+        for _ in 0..in_flight.clamp(1, units.len().max(1)) {
             scope.spawn(|| {
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
@@ -56,7 +56,7 @@ mod tests {
     use std::time::Duration;
 
     fn context(stop: &AtomicBool) -> Context<'_> {
-        Context { progress: &Silent, stop, threads: 4, memory_bytes: 100 }
+        Context::new(&Silent, stop, 4, 100).unwrap()
     }
 
     #[test]

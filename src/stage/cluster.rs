@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::kernel::absolute_difference::Kernel;
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Representatives, Stage};
@@ -51,9 +52,9 @@ pub struct Report {
     pub representative_from_centre: f64,
     /// Clusters of a single texel.
     pub single_texel_clusters: usize,
-    /// Bytes of representatives and of the tile's index.
+    /// Bytes of the representatives' samples.
     pub representative_bytes: u64,
-    /// Bytes of the index.
+    /// Bytes of the tile's index.
     pub index_bytes: u64,
     /// Bytes of the tile's raw samples.
     pub tile_bytes: u64,
@@ -85,7 +86,7 @@ pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurem
     Ok(measurement)
 }
 
-/// Checks options against the tile and the memory.
+/// Checks options against the tile.
 pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
     let tile_digest = model.stage_digest(Stage::Tile)?;
@@ -100,7 +101,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         )));
     }
     let recipe = json!({
-        "stage": "cluster",
+        "stage": "cluster", "method": METHOD,
         "tile": tile_digest,
         "clusters": options.clusters,
         "centre": options.centre,
@@ -127,7 +128,8 @@ impl Plan {
         Arrangement::new(&description.views, description.lights.len())
     }
 
-    /// Vectors of all texels, windows decoded by each thread, representatives, and the program itself.
+    /// Vectors of all texels, windows decoded by each thread, representatives, D, nearest texels, and the
+    /// program itself.
     fn memory_bytes(&self, threads: usize) -> u64 {
         const PROGRAM_BYTES: usize = 16 << 20;
         let description = self.measurement.description();
@@ -135,14 +137,17 @@ impl Plan {
         let window = self.tile.bounds().size.texels() * texel_bytes;
         let representatives = self.options.clusters * description.views.len() * texel_bytes;
         let vectors = self.tile.size.texels() * self.arrangement().stride();
-        (vectors + threads * 3 * window + 2 * representatives + PROGRAM_BYTES) as u64
+        let clusters = self.options.clusters;
+        let matrix = clusters * clusters * size_of::<f32>();
+        let nearest = self.tile.size.texels().div_ceil(lloyd::PART) * clusters * size_of::<lloyd::Near>();
+        (vectors + threads * 3 * window + 2 * representatives + matrix + nearest + PROGRAM_BYTES) as u64
     }
 
     /// Clusters the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        if self.model.is_done(Stage::Cluster, &self.recipe)? {
+        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
             return self.model.report(Stage::Cluster);
-        }
+        };
         let needed = self.memory_bytes(context.threads);
         if needed > context.memory_bytes {
             return Err(Error::usage(format!(
@@ -157,11 +162,10 @@ impl Plan {
         let kernel = Kernel::fastest();
         let Options { clusters, centre, limits, seed, .. } = self.options;
         context.progress.begin("seed clusters", clusters.saturating_sub(1) as u64, Counted::Items("centres"));
-        let seeds = context.install(|| seeding::draw(&points, clusters, seed, kernel, context))??;
+        let seeds = context.install(|| seeding::draw(&points, clusters, seed, kernel, context))?;
         context.progress.end();
         context.progress.begin("cluster", limits.passes as u64, Counted::Items("passes"));
-        let clustering =
-            context.install(|| lloyd::run(&points, &seeds, centre, limits, kernel, context))??;
+        let clustering = context.install(|| lloyd::run(&points, &seeds, centre, limits, kernel, context))?;
         context.progress.end();
         self.write(&points, &clustering, kernel, context)
     }
@@ -203,7 +207,7 @@ impl Plan {
         let texels: Vec<usize> =
             clustering.assignment.nearest.iter().map(|near| near.texel as usize).collect();
         let codes: Vec<u8> = texels.iter().flat_map(|&texel| points.vector(texel)).copied().collect();
-        let matrix = context.install(|| distance_matrix(&arrangement.plain(&codes), arrangement))?;
+        let matrix = context.install(|| distance_matrix(&arrangement.plain(&codes), arrangement));
         let representatives = self.read_representatives(&texels, context)?;
         let sources: Vec<[u32; 2]> = texels.iter().map(|&texel| self.tile.source[texel]).collect();
 

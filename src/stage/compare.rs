@@ -95,14 +95,16 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let (lights, channels) = (description.lights.len(), description.channels);
     let texel_bytes = lights * channels;
     let linear = description.transfer.table();
-    let codes = crate::color::LightnessCodes::new(description.transfer, channels, 1.0);
+    let codes = crate::color::LightnessCodes::new(description.transfer, channels, description.white);
     let stride = offsets.len().div_ceil(COLOUR_TEXELS);
     let colour =
         |sample: &[u8]| lab(std::array::from_fn(|c| linear[usize::from(sample[c.min(channels - 1)])]));
 
     let views: Vec<usize> = (0..description.views.len()).collect();
     context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
-    let sums = units::for_each(context, &views, context.threads, |&view| {
+    let window_bytes = 2 * (bounds.size.texels() * texel_bytes) as u64;
+    let in_flight = units::in_flight(context, window_bytes);
+    let sums = units::for_each(context, &views, in_flight, |&view| {
         let window = measurement.read_reflectance(view, bounds)?;
         let mut sums = Sums { views: 1, ..Sums::default() };
         for (texel, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {

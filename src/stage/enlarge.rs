@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::mrf::Synthesis;
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::shape::{Size, Window};
 use crate::stage::cluster;
 use crate::store::enlarged::{Description, Enlarged, SHARD_SIDE};
@@ -77,9 +78,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
     }
     let clusters: cluster::Report = model.report(Stage::Cluster)?;
     let recipe = json!({
-        "stage": "enlarge",
+        "stage": "enlarge", "method": METHOD,
         "model": digest,
-        "model_name": options.model.file_name().map(|name| name.to_string_lossy()),
         "size": [options.size.height, options.size.width],
         "seed": options.seed,
         "candidates": options.candidates,
@@ -137,13 +137,16 @@ impl Plan {
                 self.memory_bytes() >> 20,
                 context.memory_bytes >> 20
             ))
-            .hint("choose a lower --band or a larger --memory"));
+            .hint(
+                "choose a lower --band, a larger --memory or a smaller width, or leave out --keep-normals",
+            ));
         }
         // All that can fail for the model's sake comes before the output is begun.
         let normals = NearestNormals::new(&self.model.normals()?);
         let scan = Scan::new(self.model.index()?, self.model.distance()?);
         let mut field = Synthesis::new(&self.model.field()?, self.options.seed, height, width)?;
-        let output = Enlarged::create(&self.options.output, &self.description, &self.recipe)?;
+        let output =
+            Enlarged::create(&self.options.output, &self.description, &self.recipe, &self.options.model)?;
         let found = (0..output.shard_rows()).take_while(|&row| output.has_shard_row(row)).count();
         let report = Report {
             stored_bytes: self.index_bytes() + self.clusters.representative_bytes,
@@ -172,7 +175,7 @@ impl Plan {
             for first in (0..rows).step_by(self.band_rows()) {
                 let band_rows = self.band_rows().min(rows - first);
                 let band = synthesise(&mut field, band_rows, width, context)?;
-                let candidates = context.install(|| self.candidates(&normals, &band))?;
+                let candidates = context.install(|| self.candidates(&normals, &band));
                 for candidates in candidates.chunks_exact(width * self.options.candidates) {
                     let mut sources = vec![0; width];
                     scan.choose_row(candidates, above.as_deref(), &mut sources);

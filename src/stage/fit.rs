@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::mrf::{self, Boundary, Field};
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::store::field::FieldReport;
 use crate::store::model::{Model, Stage};
 
@@ -37,7 +38,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
         mrf::Kind::Car3d => "3d",
         mrf::Kind::Car2d => "2d",
     };
-    let recipe = json!({"stage": "fit", "normals": normals, "mrf": kind, "levels": options.levels});
+    let recipe =
+        json!({"stage": "fit", "method": METHOD, "normals": normals, "mrf": kind, "levels": options.levels});
     Ok(Plan { model, options: options.clone(), recipe })
 }
 
@@ -49,9 +51,9 @@ impl Plan {
 
     /// Fits the field, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
-        if self.model.is_done(Stage::Fit, &self.recipe)? {
+        let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe)? else {
             return self.model.report(Stage::Fit);
-        }
+        };
         context.progress.begin("fit", 1, Counted::Items("field"));
         let tile = self.model.tile()?;
         let samples = self.model.normals()?.into_iter().flatten().map(f64::from).collect();

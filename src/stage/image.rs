@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use crate::error::{Error, Result};
 use crate::picture::{Picture, false_color};
 use crate::run::Context;
@@ -55,7 +57,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Picture> {
             options.source.display()
         ))
     })?;
-    match attributes.get("kind").and_then(serde_json::Value::as_str) {
+    match attributes.get("kind").and_then(Value::as_str) {
         Some(measurement::KIND) => {
             let measurement = Measurement::open(&options.source)?;
             let window = within(options.window, measurement.description().size, context)?;
@@ -83,8 +85,8 @@ fn within(window: Option<Window>, plane: Size, context: &Context<'_>) -> Result<
     if !window.fits(plane) {
         return Err(Error::usage(format!("window {window} does not lie within {plane}")));
     }
-    // Values, display bytes and the encoded file.
-    let bytes = window.size.texels() as u64 * 20;
+    // Sums in f64, values, display bytes and the encoded file.
+    let bytes = window.size.texels() as u64 * 48;
     if bytes > context.memory_bytes {
         return Err(Error::usage(format!(
             "a picture of {} takes {} MiB of memory",
@@ -185,14 +187,13 @@ fn of_enlarged(enlarged: &Enlarged, options: &Options, context: &Context<'_>) ->
 /// The model that an enlarged index refers to.
 fn model_of(enlarged: &Enlarged, options: &Options) -> Result<Model> {
     let attributes = enlarged.attributes()?;
-    let recipe =
-        |key: &str| attributes.get("recipe").and_then(|r| r.get(key)).and_then(serde_json::Value::as_str);
+    let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or_default().to_owned();
     let path = match &options.model {
         Some(path) => path.clone(),
-        None => beside(&options.source, recipe("model_name").unwrap_or_default()),
+        None => beside(&options.source, &text(attributes.get("model_name"))),
     };
     let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
-    if recipe("model") != Some(model.digest()?.as_str()) {
+    if text(attributes.get("recipe").and_then(|recipe| recipe.get("model"))) != model.digest()? {
         return Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
             options.source.display(),

@@ -11,6 +11,7 @@ use crate::archive::Archive;
 use crate::color::{LightnessCodes, Transfer};
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Size;
 use crate::store::measurement::{Description, Measurement};
@@ -40,7 +41,6 @@ pub struct Plan {
     archive: Archive,
     store: PathBuf,
     description: Description,
-    white: f64,
     recipe: Value,
 }
 
@@ -58,7 +58,10 @@ pub struct Report {
 /// Lists the archive, checks that all images have one size, and fixes the recipe.
 pub fn plan(options: &Options) -> Result<Plan> {
     let archive = Archive::open(&options.archive)?;
-    let header = check_headers(&archive)?;
+    let header = check_images(&archive)?;
+    let degrees = |angles: &[btfkit_formats::ubo2003::Angles]| -> Vec<[f64; 2]> {
+        angles.iter().map(|angles| [angles.theta_deg(), angles.phi_deg()]).collect()
+    };
     let direction = |angles: &btfkit_formats::ubo2003::Angles| {
         Direction::from_degrees(angles.theta_deg(), angles.phi_deg())
     };
@@ -68,25 +71,30 @@ pub fn plan(options: &Options) -> Result<Plan> {
         views: archive.catalogue().views().iter().map(direction).collect(),
         lights: archive.catalogue().lights().iter().map(direction).collect(),
         transfer: options.transfer,
+        white: options.white,
     };
     let recipe = json!({
         "stage": "import",
+        "method": METHOD,
         "layout": "ubo2003",
+        "size": [header.height, header.width, u32::from(header.channels)],
+        "views": degrees(archive.catalogue().views()),
+        "lights": degrees(archive.catalogue().lights()),
         "images": archive.digest()?,
         "transfer": options.transfer,
         "white": options.white,
     });
-    Ok(Plan { archive, store: options.store.clone(), description, white: options.white, recipe })
+    Ok(Plan { archive, store: options.store.clone(), description, recipe })
 }
 
-/// Checks the size of every image by its header; returns that of the first.
-fn check_headers(archive: &Archive) -> Result<jpeg::Header> {
+/// Checks the structure of every image (not its pixels) and that all have one size; returns the first header.
+fn check_images(archive: &Archive) -> Result<jpeg::Header> {
     let (views, lights) = (archive.catalogue().views().len(), archive.catalogue().lights().len());
     let mut first = None;
     let mut problems = Vec::new();
     for (view, light) in (0..views).flat_map(|view| (0..lights).map(move |light| (view, light))) {
         let header = archive.image_bytes(view, light).and_then(|bytes| {
-            jpeg::header(&bytes, archive.limits())
+            jpeg::check(&bytes, archive.limits())
                 .map_err(|error| error.in_entry(archive.image_name(view, light)).into())
         });
         match (header, &first) {
@@ -109,7 +117,7 @@ fn check_headers(archive: &Archive) -> Result<jpeg::Header> {
             }
         }
     }
-    fail_on(archive.path(), &problems)?;
+    fail_on(archive.path(), &problems, "replace these images and run the same command again")?;
     first.ok_or_else(|| Error::input(format!("{}: no images", archive.path().display())))
 }
 
@@ -135,11 +143,11 @@ impl Plan {
         &self.description
     }
 
-    /// Memory of one view in flight: samples, codes, a group of images, and the encoded shard.
+    /// Memory of one view in flight: samples, codes, a group of images, a shard and its encoding.
     fn unit_bytes(&self) -> u64 {
         let view = self.description.view_bytes();
         let images = (self.description.size.texels() * self.description.channels * LIGHTS_AT_ONCE) as u64;
-        view * 2 + view / self.description.channels as u64 * 2 + images
+        2 * view + 2 * view / self.description.channels as u64 + images + self.description.shard_bytes()
     }
 
     /// Imports the views that are not in the store yet.
@@ -149,7 +157,8 @@ impl Plan {
             (0..self.description.views.len()).filter(|&view| !measurement.has_view(view)).collect();
         let lights = self.description.lights.len() as u64;
         context.progress.begin("import", views.len() as u64 * lights, Counted::Items("images"));
-        let codes = LightnessCodes::new(self.description.transfer, self.description.channels, self.white);
+        let codes =
+            LightnessCodes::new(self.description.transfer, self.description.channels, self.description.white);
         let clipped = AtomicU64::new(0);
         let in_flight = units::in_flight(context, self.unit_bytes());
         let problems = units::for_each(context, &views, in_flight, |&view| {
@@ -162,7 +171,8 @@ impl Plan {
             Ok(problems)
         })?;
         context.progress.end();
-        fail_on(self.archive.path(), &problems.concat())?;
+        let hint = "replace these images, delete the unfinished store and import again";
+        fail_on(self.archive.path(), &problems.concat(), hint)?;
         Ok(Report {
             views_found: self.description.views.len() - views.len(),
             views_written: views.len(),
@@ -219,7 +229,7 @@ impl Plan {
 }
 
 /// One error that names all problems.
-fn fail_on(archive: &Path, problems: &[String]) -> Result<()> {
+fn fail_on(archive: &Path, problems: &[String], hint: &str) -> Result<()> {
     if problems.is_empty() {
         return Ok(());
     }
@@ -234,5 +244,5 @@ fn fail_on(archive: &Path, problems: &[String]) -> Result<()> {
         problems.len(),
         lines.join("\n  ")
     ))
-    .hint("replace these images and run the same command again; views without faults are kept"))
+    .hint(hint))
 }

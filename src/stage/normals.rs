@@ -10,6 +10,7 @@ use crate::color::luminance;
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::shape::{Size, Window};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::measurement::Measurement;
@@ -56,7 +57,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
     let tile = model.stage_digest(Stage::Tile)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
-    let recipe = json!({"stage": "normals", "tile": tile, "robust": options.robust});
+    let recipe = json!({"stage": "normals", "method": METHOD, "tile": tile, "robust": options.robust});
     Ok(Plan { measurement, model, robust: options.robust, recipe })
 }
 
@@ -68,9 +69,9 @@ impl Plan {
 
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        if self.model.is_done(Stage::Normals, &self.recipe)? {
+        let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe)? else {
             return self.model.report(Stage::Normals);
-        }
+        };
         let description = self.measurement.description();
         let view = frontal_view(&self.measurement);
         let tile = self.model.tile()?;
@@ -114,7 +115,7 @@ impl Plan {
             let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
             let samples = self.measurement.read_reflectance(view, band)?;
             let band: Vec<[f32; 3]> =
-                context.install(|| samples.par_chunks_exact(lights * channels).map(normal).collect())?;
+                context.install(|| samples.par_chunks_exact(lights * channels).map(normal).collect());
             normals.extend(band);
             context.progress.advance(rows as u64);
         }
@@ -137,7 +138,7 @@ pub(crate) fn mean_and_spread(normals: &[[f32; 3]]) -> ([f64; 3], f64) {
     let length = mean.iter().map(|m| m * m).sum::<f64>().sqrt();
     let squared = |normal: &[f32; 3]| {
         let cosine: f64 = normal.iter().zip(mean).map(|(&n, m)| f64::from(n) * m / length).sum();
-        cosine.clamp(-1.0, 1.0).acos().to_degrees().powi(2)
+        libm::acos(cosine.clamp(-1.0, 1.0)).to_degrees().powi(2)
     };
     (mean, (normals.iter().map(squared).sum::<f64>() / count).sqrt())
 }

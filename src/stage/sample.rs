@@ -56,11 +56,11 @@ pub fn directions(count: usize) -> Result<Vec<Angles>> {
     if !(1..=MOST).contains(&count) {
         return Err(Error::usage(format!("{count} directions were asked for, expected 1 to {MOST}")));
     }
-    let total: f64 = RINGS_DEG.iter().map(|theta| theta.to_radians().sin()).sum();
+    let total: f64 = RINGS_DEG.iter().map(|theta| libm::sin(theta.to_radians())).sum();
     let mut angles = vec![(0.0, 0.0)];
     let (mut asked, mut given) = (0.0, 0);
     for (number, theta) in RINGS_DEG.into_iter().enumerate() {
-        asked += theta.to_radians().sin() / total * (count - 1) as f64;
+        asked += libm::sin(theta.to_radians()) / total * (count - 1) as f64;
         let ring = asked.round() as usize - given;
         given += ring;
         // Rings of few directions are turned against each other, so that they do not all lie in one plane.
@@ -81,7 +81,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let surface = Surface::new(options.kind, width, height, options.scale, options.seed)?;
     let light_angles: Vec<[f64; 2]> = lights.iter().map(radians).collect();
     context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));
-    let scene = context.install(|| Scene::new(surface, &light_angles))?;
+    let scene = context.install(|| Scene::new(surface, &light_angles));
 
     let temporary = temporary_name(&options.archive);
     let failed = |error| Error::io("write", &options.archive, error);
@@ -104,7 +104,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                         Ok(bytes)
                     })
                     .collect::<Result<Vec<Vec<u8>>>>()
-            })??;
+            })?;
             for (light, bytes) in images.iter().enumerate() {
                 let name = write_name(light as u32, lights[light], number as u32, *view, views.len() as u32)?;
                 zip.write_entry(&name, bytes)

@@ -10,6 +10,7 @@ use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::shape::Size;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
@@ -98,6 +99,7 @@ pub struct Plan {
     measurement: Measurement,
     model: PathBuf,
     choice: Choice,
+    range: Option<SearchRange>,
     seed: u64,
     recipe: Value,
 }
@@ -106,16 +108,28 @@ pub struct Plan {
 pub fn plan(options: &Options) -> Result<Plan> {
     let measurement = Measurement::open(&options.measurement)?;
     let plane = measurement.description().size;
-    if let Choice::Sized(size) = options.choice {
-        range_of(size, plane)?;
-    }
+    let range = match options.choice {
+        Choice::None | Choice::Periodic => None,
+        Choice::Sized(size) => Some(range_of(size, plane)?),
+        Choice::Auto => Some(SearchRange::for_plane(plane).ok_or_else(|| {
+            Error::usage(format!("a measurement of {plane} is too small to cut a seamless tile from"))
+                .hint("use --tile none, or --tile periodic if its borders join already")
+        })?),
+    };
     let recipe = json!({
-        "stage": "tile",
+        "stage": "tile", "method": METHOD,
         "measurement": measurement.digest(),
         "tile": options.choice.to_string(),
         "seed": options.seed,
     });
-    Ok(Plan { measurement, model: options.model.clone(), choice: options.choice, seed: options.seed, recipe })
+    Ok(Plan {
+        measurement,
+        model: options.model.clone(),
+        choice: options.choice,
+        range,
+        seed: options.seed,
+        recipe,
+    })
 }
 
 /// The search range of a tile of one size.
@@ -140,27 +154,19 @@ impl Plan {
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let model = Model::create(&self.model)?;
-        if model.is_done(Stage::Tile, &self.recipe)? {
+        let Some(_lock) = model.begin(Stage::Tile, &self.recipe)? else {
             return model.report(Stage::Tile);
-        }
+        };
         let description = self.measurement.description();
         let plane = description.size;
-        let range = match self.choice {
-            Choice::None | Choice::Periodic => None,
-            Choice::Sized(size) => Some(range_of(size, plane)?),
-            Choice::Auto => Some(SearchRange::for_plane(plane).ok_or_else(|| {
-                Error::usage(format!("a measurement of {plane} is too small to cut a seamless tile from"))
-                    .hint("use --tile none, or --tile periodic if its borders join already")
-            })?),
-        };
         let features = self.features(context)?;
-        let (tile, patch) = context.install(|| match range {
+        let (tile, patch) = context.install(|| match &self.range {
             None => (Tile::whole(plane, self.choice == Choice::Periodic), None),
             Some(range) => {
-                let cut = cut(&features, search(&features, &range, self.seed));
+                let cut = cut(&features, search(&features, range, self.seed));
                 (cut.tile, Some(cut.patch))
             }
-        })?;
+        });
         let report = Report {
             size: [tile.size.height, tile.size.width],
             wraps: tile.wraps,

@@ -39,9 +39,12 @@ pub struct Description {
 
 impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
-    pub fn create(path: &Path, description: &Description, recipe: &Value) -> Result<Self> {
+    ///
+    /// `model` is the model's place; its name is kept, to find it beside the result.
+    pub fn create(path: &Path, description: &Description, recipe: &Value, model: &Path) -> Result<Self> {
         let store = Store::at(path);
-        store.begin(KIND, recipe, &json!({}))?;
+        let model_name = model.file_name().map(|name| name.to_string_lossy());
+        store.begin(KIND, recipe, &json!({"model_name": model_name}))?;
         let wide = description.clusters > 256;
         let index = if wide {
             create::<u16>(&store, description.size)

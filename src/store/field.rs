@@ -4,10 +4,16 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mrf::car::Prior;
 use crate::mrf::{Kind, Level, Model};
 use crate::store::{Layout, Store};
+
+/// Channels of a field of normals.
+const NORMAL_COMPONENTS: usize = 3;
+
+/// Farthest site that a stored neighbourhood may have: rows as far back are kept in memory.
+const FARTHEST_SITE: u32 = 64;
 
 /// What the attributes of stage `fit` tell of the field, beside its arrays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -95,6 +101,12 @@ pub(super) fn write(store: &Store, field: &Model) -> Result<()> {
 pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Model> {
     let (_, mean) = store.read::<f64>("mrf/mean", &[0])?;
     let channels = mean.len();
+    if channels != NORMAL_COMPONENTS {
+        return Err(Error::input(format!(
+            "{}: mrf/mean: got {channels} channels, expected {NORMAL_COMPONENTS}",
+            store.path().display()
+        )));
+    }
     let kind = report.kind();
     let transform = match kind {
         Kind::Car3d => None,
@@ -124,6 +136,13 @@ fn read_level(
     let group = format!("mrf/level_{number}");
     let (_, sites) = store.read::<i32>(&format!("{group}/neighbourhood"), &[0, 2])?;
     let neighbourhood: Vec<[i32; 2]> = sites.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
+    let near = |[dy, dx]: &[i32; 2]| dy.unsigned_abs().max(dx.unsigned_abs()) <= FARTHEST_SITE;
+    if neighbourhood.is_empty() || !neighbourhood.iter().all(near) {
+        return Err(Error::input(format!(
+            "{}: {group}/neighbourhood: expected at least one site, none farther than {FARTHEST_SITE}",
+            store.path().display()
+        )));
+    }
     let (columns, sigma_shape) = match kind {
         Kind::Car3d => (channels * neighbourhood.len(), vec![channels, channels]),
         Kind::Car2d => (neighbourhood.len(), vec![channels]),

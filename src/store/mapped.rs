@@ -69,9 +69,11 @@ impl MappedStorage {
     }
 }
 
-/// Writes `bytes` to `path` so that it appears whole or not at all.
+/// Writes `bytes` to `path` so that it appears whole or not at all, also after a power failure.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // A folder that is made now has to reach the disk as an entry of its parent.
+    let made: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.exists()).collect();
     fs::create_dir_all(folder)?;
     let temporary = temporary_name(path);
     let written = File::create_new(&temporary).and_then(|mut file| {
@@ -82,7 +84,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
         let _ = fs::remove_file(&temporary);
         return Err(error);
     }
-    File::open(folder)?.sync_all()
+    File::open(folder)?.sync_all()?;
+    made.iter().filter_map(|folder| folder.parent()).try_for_each(|parent| {
+        File::open(if parent.as_os_str().is_empty() { Path::new(".") } else { parent })?.sync_all()
+    })
 }
 
 /// The temporary name beside `path`: process ids repeat across hosts, so it bears host, pid and random bits.
@@ -94,7 +99,8 @@ pub(crate) fn temporary_name(path: &Path) -> PathBuf {
 
 fn host() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let name: String = name.trim().chars().filter(char::is_ascii_alphanumeric).collect();
+    let name: String =
+        name.trim().chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
     if name.is_empty() { "host".to_owned() } else { name }
 }
 
@@ -108,9 +114,10 @@ fn is_abandoned(path: &Path) -> bool {
     let Some((_, owner)) = name.rsplit_once(TEMPORARY) else { return false };
     let mut parts = owner.split('-');
     let (owner_host, pid) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
-    let dead = owner_host == host()
-        && pid != std::process::id().to_string()
-        && !Path::new("/proc").join(pid).exists();
+    // Where there is no list of processes only the age tells.
+    let listed = Path::new("/proc/self").exists();
+    let alive = pid == std::process::id().to_string() || Path::new("/proc").join(pid).exists();
+    let dead = owner_host == host() && listed && !alive;
     let old = fs::metadata(path)
         .and_then(|data| data.modified())
         .is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age > ABANDONED_AFTER));

@@ -41,6 +41,8 @@ pub struct Description {
     pub lights: Vec<Direction>,
     /// Transfer curve of the samples.
     pub transfer: Transfer,
+    /// Reflectance that counts as L* = 100.
+    pub white: f64,
 }
 
 impl Description {
@@ -52,6 +54,12 @@ impl Description {
     /// Bytes of all samples.
     pub fn bytes(&self) -> u64 {
         self.view_bytes() * self.views.len() as u64
+    }
+
+    /// Bytes of one shard's samples.
+    pub fn shard_bytes(&self) -> u64 {
+        let side = self.shard_side(SHARD_LIMIT_BYTES);
+        (side * side * self.lights.len() * self.channels) as u64
     }
 
     /// Side of a shard: the whole plane, or as much as keeps a shard within `limit_bytes`.
@@ -91,7 +99,13 @@ impl Measurement {
     ) -> Result<Self> {
         let store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
-        store.begin(KIND, recipe, &json!({"radiometry": radiometry, "transfer": description.transfer}))?;
+        store.begin(
+            KIND,
+            recipe,
+            &json!({
+                "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
+            }),
+        )?;
         write_directions(&store, "view_direction", "view", &description.views)?;
         write_directions(&store, "light_direction", "light", &description.lights)?;
         let side = description.shard_side(limit_bytes);
@@ -118,7 +132,12 @@ impl Measurement {
         let expected = [n_views, height, width, n_lights];
         let consistent = (n_views, n_lights) == (views.len() as u64, lights.len() as u64)
             && luminance.shape() == expected
-            && matches!(channels, 1 | 3);
+            && matches!(channels, 1 | 3)
+            && reflectance
+                .shape()
+                .iter()
+                .try_fold(1u64, |product, &n| product.checked_mul(n))
+                .is_some_and(|n| n > 0);
         if !consistent {
             return Err(damaged(format!(
                 "got reflectance {:?}, luminance {:?}, {} views and {} lights, which do not fit together",
@@ -132,6 +151,9 @@ impl Measurement {
             .get("transfer")
             .and_then(|value| serde_json::from_value(value.clone()).ok())
             .ok_or_else(|| damaged("attribute btfkit.transfer: expected srgb or linear".to_owned()))?;
+        let white = found.get("white").and_then(Value::as_f64).filter(|white| *white > 0.0);
+        let white =
+            white.ok_or_else(|| damaged("attribute btfkit.white: expected a reflectance".to_owned()))?;
         let digest = found.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
         let description = Description {
             size: Size::new(height as usize, width as usize),
@@ -139,6 +161,7 @@ impl Measurement {
             views,
             lights,
             transfer,
+            white,
         };
         let side = reflectance
             .chunk_shape(&[0; 5])
@@ -319,7 +342,7 @@ mod tests {
     fn description(size: Size) -> Description {
         let direction = |n: u32| Direction::from_degrees(f64::from(n), 0.0);
         let (views, lights) = ((0..2).map(direction).collect(), (0..5).map(direction).collect());
-        Description { size, channels: 3, views, lights, transfer: Transfer::Srgb }
+        Description { size, channels: 3, views, lights, transfer: Transfer::Srgb, white: 1.0 }
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 pub mod enlarged;
 pub mod field;
+mod lock;
 pub mod mapped;
 pub mod measurement;
 pub mod model;
@@ -20,6 +21,7 @@ use zarrs::array::{
 
 use crate::error::{Error, Kind, Result};
 use crate::run::recipe;
+pub use lock::Lock;
 use mapped::MappedStorage;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
@@ -103,6 +105,24 @@ impl Store {
         self.storage.sweep()
     }
 
+    /// Waits until no other process holds the lock `name` of this store.
+    pub fn lock(&self, name: &str) -> Result<Lock> {
+        Lock::wait(&self.path, name)
+    }
+
+    /// Whether an array and all of its chunks (or shards) are there.
+    pub fn is_whole(&self, name: &str) -> bool {
+        let Ok(array) = self.open_array(name) else { return false };
+        let grid = array.chunk_grid_shape().to_vec();
+        let total: u64 = grid.iter().product();
+        (0..total).all(|number| {
+            let mut rest = number;
+            let mut indices: Vec<u64> = grid.iter().rev().map(|&n| (rest % n, rest /= n).0).collect();
+            indices.reverse();
+            self.has_chunk(&array, &indices)
+        })
+    }
+
     /// Our attributes (key `btfkit`) of the root group; `None` where there is no store.
     ///
     /// # Errors
@@ -114,7 +134,7 @@ impl Store {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 // What a killed writer left of its first file is no obstacle.
                 let is_leftover = |entry: std::io::Result<std::fs::DirEntry>| {
-                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()))
+                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()) || lock::is_lock(&e.path()))
                 };
                 let occupied =
                     std::fs::read_dir(&self.path).is_ok_and(|mut entries| !entries.all(is_leftover));
@@ -143,6 +163,8 @@ impl Store {
     /// # Errors
     /// [`Kind::Recipe`] where another recipe's store lies there.
     pub fn begin(&self, kind: &str, recipe: &Value, more: &Value) -> Result<()> {
+        self.attributes()?;
+        let _lock = self.lock("")?;
         if let Some(found) = self.attributes()? {
             self.expect(kind)?;
             recipe::expect_same(&self.path, &found, recipe)?;
@@ -265,6 +287,17 @@ impl Store {
     /// [`Kind::Missing`] where a shard of it has not been written, [`Kind::Input`] where it is damaged.
     pub fn read_box<T: Named>(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<T>> {
         let name = array.path().as_str().trim_start_matches('/').to_owned();
+        let within =
+            start.iter().zip(extent).zip(array.shape()).all(|((&start, &extent), &length)| {
+                start.checked_add(extent).is_some_and(|end| end <= length)
+            });
+        if start.len() != array.dimensionality() || extent.len() != start.len() || !within {
+            return Err(Error::input(format!(
+                "{}: {name}: got shape {:?}, expected it to hold {extent:?} from {start:?} on",
+                self.path.display(),
+                array.shape()
+            )));
+        }
         let bytes = extent.iter().try_fold(size_of::<T>() as u64, |product, &n| product.checked_mul(n));
         if bytes.is_none_or(|bytes| bytes > WHOLE_ARRAY_LIMIT_BYTES) {
             return Err(Error::input(format!(

@@ -14,7 +14,7 @@ use crate::run::recipe;
 use crate::shape::Size;
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
-use crate::store::{FORMAT, Layout, Named, Store};
+use crate::store::{FORMAT, Layout, Lock, Named, Store};
 use crate::texel::direction::Direction;
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
@@ -44,6 +44,24 @@ impl Stage {
             Self::Normals => "normals",
             Self::Fit => "fit",
         }
+    }
+
+    /// Its arrays; `report` is that of the stage.
+    fn arrays(self, report: Option<&Value>) -> Vec<String> {
+        let fixed: &[&str] = match self {
+            Self::Tile => {
+                &["tile_source", "view_direction", "light_direction", "view_triangles", "light_triangles"]
+            }
+            Self::Cluster => &["index", "centres", "representatives", "representative_texel", "distance"],
+            Self::Normals => &["normals"],
+            Self::Fit => &["mrf/mean"],
+        };
+        let levels =
+            report.and_then(|report| report.get("levels")).and_then(Value::as_array).map_or(0, Vec::len);
+        let of_level = |level: usize| {
+            ["gamma", "sigma", "neighbourhood"].map(|name| format!("mrf/level_{level}/{name}"))
+        };
+        fixed.iter().map(|&name| name.to_owned()).chain((0..levels).flat_map(of_level)).collect()
     }
 }
 
@@ -100,23 +118,24 @@ impl Model {
         Ok(recipe::digest(&json!({"cluster": cluster, "fit": fit})))
     }
 
-    /// Whether a stage has been run by this recipe.
+    /// Begins a stage and holds it against other processes; none where it is done by this recipe and
+    /// its arrays are all there.
     ///
     /// # Errors
     /// Where it has been run by another recipe.
-    pub fn is_done(&self, stage: Stage, recipe: &Value) -> Result<bool> {
-        match self.stage(stage)? {
-            None => Ok(false),
-            Some(entry) => {
-                let place = format!("{} ({})", self.path().display(), stage.name());
-                recipe::expect_same(Path::new(&place), &entry, recipe)?;
-                Ok(true)
-            }
-        }
+    pub fn begin(&self, stage: Stage, recipe: &Value) -> Result<Option<Lock>> {
+        let lock = self.store.lock(&format!("-{}", stage.name()))?;
+        let Some(entry) = self.stage(stage)? else { return Ok(Some(lock)) };
+        let place = format!("{} ({})", self.path().display(), stage.name());
+        recipe::expect_same(Path::new(&place), &entry, recipe)?;
+        let whole = stage.arrays(entry.get("report")).iter().all(|array| self.store.is_whole(array));
+        Ok(if whole { None } else { Some(lock) })
     }
 
     /// Declares a stage done; to be called after its arrays are written.
     pub fn finish(&self, stage: Stage, recipe: &Value, report: &impl serde::Serialize) -> Result<()> {
+        // Another stage may be writing its own entry.
+        let _lock = self.store.lock("")?;
         let mut attributes = self.store.expect(KIND)?;
         let report = serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))?;
         let entry = json!({"recipe": recipe, "digest": recipe::digest(recipe), "report": report});
@@ -176,7 +195,15 @@ impl Model {
         let report: Map<String, Value> = self.report(Stage::Tile)?;
         let wraps = report.get("wraps").and_then(Value::as_bool).unwrap_or(false);
         let (shape, coordinates) = self.store.read::<u32>("tile_source", &[0, 0, 2])?;
-        let source = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+        let source: Vec<[u32; 2]> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+        let plane = report.get("measurement_size").and_then(Value::as_array);
+        let side = |axis: usize| plane.and_then(|plane| plane.get(axis)?.as_u64()).unwrap_or(0);
+        let within = |[row, column]: &[u32; 2]| u64::from(*row) < side(0) && u64::from(*column) < side(1);
+        if source.is_empty() || !source.iter().all(within) {
+            return Err(
+                self.damaged("tile_source", "a source lies outside the measurement, or there is none")
+            );
+        }
         Ok(Tile { size: Size::new(shape[0], shape[1]), source, wraps })
     }
 
@@ -194,7 +221,22 @@ impl Model {
         } else {
             self.store.read::<u8>("index", &[height, width])?.1.into_iter().map(u16::from).collect()
         };
-        Ok(index)
+        let clusters = self.clusters()?;
+        match index.iter().find(|&&cluster| usize::from(cluster) >= clusters) {
+            None => Ok(index),
+            Some(cluster) => Err(self.damaged("index", &format!("cluster {cluster} of {clusters}"))),
+        }
+    }
+
+    /// Number of clusters.
+    fn clusters(&self) -> Result<usize> {
+        let report: Map<String, Value> = self.report(Stage::Cluster)?;
+        Ok(report.get("clusters").and_then(Value::as_u64).unwrap_or(0) as usize)
+    }
+
+    fn damaged(&self, array: &str, what: &str) -> Error {
+        Error::input(format!("{}: {array}: {what}", self.path().display()))
+            .hint("delete this array's folder and run the command that made it again")
     }
 
     /// Writes centres [cluster, view, light], u8 L* codes.
@@ -222,6 +264,14 @@ impl Model {
     /// The measured colour BRDFs that stand for the clusters.
     pub fn representatives(&self) -> Result<Representatives> {
         let (shape, samples) = self.store.read::<u8>("representatives", &[0, 0, 0, 0])?;
+        let [views, lights] = self.directions()?;
+        if shape[..3] != [self.clusters()?, views.len(), lights.len()]
+            || !matches!(shape[3], 1 | 3)
+            || samples.is_empty()
+        {
+            return Err(self
+                .damaged("representatives", &format!("got shape {shape:?}, which does not fit the model")));
+        }
         let report: Map<String, Value> = self.report(Stage::Tile)?;
         let transfer = report.get("transfer").cloned().unwrap_or_default();
         let transfer: Transfer = serde_json::from_value(transfer)
@@ -240,12 +290,10 @@ impl Model {
 
     /// D of (26), row by row.
     pub fn distance(&self) -> Result<Vec<f32>> {
-        let (shape, distance) = self.store.read::<f32>("distance", &[0, 0])?;
-        if shape[0] != shape[1] || !distance.iter().all(|d| d.is_finite() && *d >= 0.0) {
-            return Err(Error::input(format!(
-                "{}: distance: expected a square array of numbers >= 0",
-                self.path().display()
-            )));
+        let clusters = self.clusters()?;
+        let (_, distance) = self.store.read::<f32>("distance", &[clusters, clusters])?;
+        if !distance.iter().all(|d| d.is_finite() && *d >= 0.0) {
+            return Err(self.damaged("distance", "expected finite numbers >= 0"));
         }
         Ok(distance)
     }
@@ -259,7 +307,12 @@ impl Model {
     pub fn normals(&self) -> Result<Vec<[f32; 3]>> {
         let Size { height, width } = self.tile()?.size;
         let (_, values) = self.store.read::<f32>("normals", &[height, width, 3])?;
-        Ok(values.chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect())
+        match values.iter().position(|value| !value.is_finite()) {
+            None => Ok(values.chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect()),
+            Some(at) => {
+                Err(self.damaged("normals", &format!("texel {} has a component {}", at / 3, values[at])))
+            }
+        }
     }
 
     /// Writes the random field model under `mrf/`.

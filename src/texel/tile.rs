@@ -162,7 +162,7 @@ pub struct SearchRange {
 }
 
 impl SearchRange {
-    /// The default range for a plane: tiles of half its side up to all of it, at most 256 a side.
+    /// The default range for a plane: tiles of five eighths of its side up to all of it, at most 256 a side.
     ///
     /// Returns `None` where the plane is too small to cut a tile with an overlap from it.
     pub fn for_plane(size: Size) -> Option<Self> {
@@ -256,7 +256,7 @@ fn score(features: &Features, patch: Patch) -> f64 {
     });
     let (_, horizontal) = least_path(&cost, width, overlap - 1, false);
     let per_texel = vertical as f64 / (height + overlap) as f64 + horizontal as f64 / width as f64;
-    (per_texel + 1.0) / ((height * width) as f64).cbrt()
+    (per_texel + 1.0) / libm::cbrt((height * width) as f64)
 }
 
 /// How far neighbours differ across the seams, relative to neighbours elsewhere (1: no more than usual).

@@ -58,7 +58,7 @@ impl Interpolator {
     }
 
     /// The mix that stands for `direction`: barycentric within a triangle, at the border for its
-    /// azimuth beyond the outer ring, the nearest direction where there are no triangles.
+    /// azimuth beyond the outer ring, else (no triangles, or none on that side) the nearest direction.
     pub fn mix(&self, direction: Direction) -> Mix {
         let target = direction.vector();
         let nearest = self.nearest(target);
@@ -76,7 +76,10 @@ impl Interpolator {
             Some((corners, weights)) if least(&weights) > -NEGLIGIBLE_WEIGHT => {
                 Mix { terms: shares(corners.iter().copied().zip(weights)), cosine_ratio: 1.0 }
             }
-            _ => self.at_border(target).unwrap_or_else(|| exact(nearest)),
+            _ => self.at_border(target).unwrap_or_else(|| Mix {
+                terms: vec![(nearest, 1.0)],
+                cosine_ratio: (target[2] / self.vectors[nearest][2].max(1e-9)).clamp(0.0, 1.0),
+            }),
         }
     }
 
@@ -229,6 +232,18 @@ mod tests {
     fn one_direction_alone_stands_for_all() {
         let one = [Direction::from_degrees(0.0, 0.0)];
         let interpolator = Interpolator::new(&one, &triangulate(&one));
-        assert_eq!(interpolator.mix(Direction::from_degrees(40.0, 10.0)).terms, [(0, 1.0)]);
+        let mix = interpolator.mix(Direction::from_degrees(40.0, 10.0));
+        assert_eq!(mix.terms, [(0, 1.0)]);
+        assert!((mix.cosine_ratio - 40f64.to_radians().cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_grazing_light_on_a_side_without_lights_stays_grazing() {
+        let half: Vec<Direction> = (0..7)
+            .flat_map(|k| [30.0, 60.0].map(|theta| Direction::from_degrees(theta, 30.0 * f64::from(k))))
+            .chain([Direction::from_degrees(0.0, 0.0)])
+            .collect();
+        let interpolator = Interpolator::new(&half, &triangulate(&half));
+        assert!(interpolator.mix(Direction::from_degrees(89.0, 270.0)).cosine_ratio < 0.03);
     }
 }

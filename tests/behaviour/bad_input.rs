@@ -43,7 +43,7 @@ fn name(path: &Path) -> String {
 }
 
 #[test]
-fn every_image_cut_short_is_named_and_the_whole_views_are_kept() {
+fn every_image_cut_short_is_named() {
     let images = Images::new();
     for &number in &[5, 40] {
         let bytes = std::fs::read(&images.paths[number]).unwrap();
@@ -51,8 +51,8 @@ fn every_image_cut_short_is_named_and_the_whole_views_are_kept() {
     }
     let told = fail(&mut images.import(), 65);
     assert!(told.contains(&name(&images.paths[5])) && told.contains(&name(&images.paths[40])), "{told}");
-    let measurement = btfkit::store::measurement::Measurement::open(&images.store()).unwrap();
-    assert_eq!(measurement.views_done(), 7, "the two views with a cut image must not count as done");
+    assert!(!images.store().exists());
+    images.mend_and_import();
 }
 
 #[test]

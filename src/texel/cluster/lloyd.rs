@@ -9,8 +9,11 @@ use crate::run::Context;
 use crate::texel::cluster::centre::{self, CentreRule};
 use crate::texel::cluster::points::Points;
 
-/// Texels assigned in one go: their vectors stay in the second cache while the centres pass by.
+/// Texels whose distances are computed in one go: their vectors stay in the second cache while the centres pass by.
 const BLOCK: usize = 64;
+
+/// Texels that a thread takes at a time; each such part keeps its own nearest texel of every centre.
+pub const PART: usize = 1024;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -51,27 +54,30 @@ impl Assignment {
 pub fn assign(points: &Points, centres: &[u8], kernel: Kernel) -> Assignment {
     let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
     let count = centres.len() / stride;
-    let blocks: Vec<(Vec<u16>, Vec<u64>, Vec<Near>)> = points
+    let parts: Vec<(Vec<u16>, Vec<u64>, Vec<Near>)> = points
         .vectors
-        .par_chunks(BLOCK * stride)
+        .par_chunks(PART * stride)
         .enumerate()
-        .map(|(block, vectors)| {
+        .map(|(part, vectors)| {
             let texels = vectors.len() / stride;
-            let mut all = vec![0; texels * count];
-            kernel.distances(vectors, centres, stride, groups, &mut all);
+            let mut all = vec![0; BLOCK.min(texels) * count];
             let mut nearest = vec![Near { distance: u64::MAX, texel: u32::MAX }; count];
             let (mut index, mut distances) = (Vec::with_capacity(texels), Vec::with_capacity(texels));
-            for (number, row) in all.chunks_exact(count).enumerate() {
-                let texel = (block * BLOCK + number) as u32;
-                let (mut best, mut least) = (0, u64::MAX);
-                for (cluster, (&distance, nearest)) in row.iter().zip(&mut nearest).enumerate() {
-                    if distance < least {
-                        (best, least) = (cluster, distance);
+            for vectors in vectors.chunks(BLOCK * stride) {
+                let all = &mut all[..vectors.len() / stride * count];
+                kernel.distances(vectors, centres, stride, groups, all);
+                for row in all.chunks_exact(count) {
+                    let texel = (part * PART + index.len()) as u32;
+                    let (mut best, mut least) = (0, u64::MAX);
+                    for (cluster, (&distance, nearest)) in row.iter().zip(&mut nearest).enumerate() {
+                        if distance < least {
+                            (best, least) = (cluster, distance);
+                        }
+                        *nearest = (*nearest).min(Near { distance, texel });
                     }
-                    *nearest = (*nearest).min(Near { distance, texel });
+                    index.push(best as u16);
+                    distances.push(least);
                 }
-                index.push(best as u16);
-                distances.push(least);
             }
             (index, distances, nearest)
         })
@@ -81,11 +87,11 @@ pub fn assign(points: &Points, centres: &[u8], kernel: Kernel) -> Assignment {
         distances: Vec::with_capacity(points.len()),
         nearest: vec![Near { distance: u64::MAX, texel: u32::MAX }; count],
     };
-    for (index, distances, nearest) in blocks {
+    for (index, distances, nearest) in parts {
         whole.index.extend(index);
         whole.distances.extend(distances);
-        for (all, block) in whole.nearest.iter_mut().zip(nearest) {
-            *all = (*all).min(block);
+        for (all, part) in whole.nearest.iter_mut().zip(nearest) {
+            *all = (*all).min(part);
         }
     }
     whole
@@ -212,13 +218,11 @@ mod tests {
         rule: CentreRule,
     ) -> Clustering {
         let stop = AtomicBool::new(false);
-        let context = Context { progress: &Silent, stop: &stop, threads, memory_bytes: 1 << 30 };
-        context
-            .install(|| {
-                let seeds = seeding::draw(points, count, 1, kernel, &context).unwrap();
-                run(points, &seeds, rule, Limits { passes: 50, tolerance: 0.0 }, kernel, &context).unwrap()
-            })
-            .unwrap()
+        let context = Context::new(&Silent, &stop, threads, 1 << 30).unwrap();
+        context.install(|| {
+            let seeds = seeding::draw(points, count, 1, kernel, &context).unwrap();
+            run(points, &seeds, rule, Limits { passes: 50, tolerance: 0.0 }, kernel, &context).unwrap()
+        })
     }
 
     #[test]

@@ -243,3 +243,49 @@ fn no_flipped_bit_of_a_store_brings_the_reader_down() {
     assert!(read().unwrap() == truth);
     assert!(refused > 1000, "{refused}");
 }
+
+/// The metadata of every array of a model with one bit flipped, byte by byte: an error or a reading, never a panic.
+#[test]
+fn no_flipped_bit_of_a_models_metadata_brings_the_reader_down() {
+    use btfkit::store::model::Model;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.zarr");
+    succeed(btf().arg("model").args([&fixture().measurement(), &path]).args([
+        "--clusters",
+        "8",
+        "--mrf",
+        "2d",
+    ]));
+    let read = || -> btfkit::Result<()> {
+        let model = Model::open(&path)?;
+        let (_, _, _, _) = (model.tile()?, model.index()?, model.normals()?, model.distance()?);
+        let (_, _, _) = (model.representatives()?, model.field()?, model.triangles()?);
+        model.digest().map(drop)
+    };
+    read().unwrap();
+    let mut refused = 0;
+    for file in [
+        "zarr.json",
+        "tile_source/zarr.json",
+        "index/zarr.json",
+        "normals/zarr.json",
+        "distance/zarr.json",
+        "representatives/zarr.json",
+        "view_triangles/zarr.json",
+        "mrf/mean/zarr.json",
+        "mrf/level_0/gamma/zarr.json",
+        "mrf/level_0/neighbourhood/zarr.json",
+    ] {
+        let file = path.join(file);
+        let whole = std::fs::read(&file).unwrap();
+        for at in 0..whole.len() {
+            let mut harmed = whole.clone();
+            harmed[at] ^= 1 << (at % 8);
+            std::fs::write(&file, &harmed).unwrap();
+            refused += usize::from(read().is_err());
+        }
+        std::fs::write(&file, &whole).unwrap();
+    }
+    read().unwrap();
+    assert!(refused > 3000, "{refused}");
+}

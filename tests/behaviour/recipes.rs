@@ -117,3 +117,49 @@ fn usage_errors_exit_with_2() {
     );
     assert!(told.contains("1000000"), "{told}");
 }
+
+#[test]
+fn a_model_that_lost_an_array_is_mended_by_the_same_command() {
+    let fixture = fixture();
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.zarr");
+    let run =
+        || succeed(btf().arg("model").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    run();
+    let whole = tree(&model);
+    for lost in ["index/c/0/0", "mrf/level_0/gamma/c/0/0", "tile_source/zarr.json", "normals/c/0/0/0"] {
+        std::fs::remove_file(model.join(lost)).unwrap();
+        run();
+        assert_eq!(whole, tree(&model), "{lost}");
+    }
+}
+
+#[test]
+fn of_two_recipes_started_at_once_one_wins_and_the_other_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for round in 0..4 {
+        let store = folder.path().join(format!("{round}.zarr"));
+        let start = |white: &str| {
+            let mut command = btf();
+            command.arg("import").args([&fixture().archive(), &store]).args(["--white", white, "-q"]);
+            command.stderr(std::process::Stdio::null()).spawn().unwrap()
+        };
+        let (mut first, mut second) = (start("1"), start("0.5"));
+        let mut codes = [first.wait().unwrap().code(), second.wait().unwrap().code()];
+        codes.sort_unstable();
+        assert_eq!(codes, [Some(0), Some(65)]);
+    }
+}
+
+#[test]
+fn two_processes_with_one_recipe_make_one_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("shared.zarr");
+    let start = || {
+        let mut command = btf();
+        command.arg("import").args([&fixture().archive(), &store]).arg("-q").spawn().unwrap()
+    };
+    let (mut first, mut second) = (start(), start());
+    assert!(first.wait().unwrap().success() && second.wait().unwrap().success());
+    crate::fixture::assert_same(&store, &fixture().measurement());
+}

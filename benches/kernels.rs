@@ -1,0 +1,107 @@
+//! The hot loops, each beside its plain form or its parts: `cargo bench`.
+//!
+//! Whole stages are measured by `scripts/bench`.
+#![allow(clippy::expect_used)]
+
+use btfkit::color::{LightnessCodes, Transfer};
+use btfkit::kernel::absolute_difference::Kernel;
+use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
+use btfkit::random::Hash;
+use btfkit::texel::cluster::points::Arrangement;
+use btfkit::texel::direction::Direction;
+use btfkit::texel::nearest::{NearestNormals, Neighbour};
+use divan::counter::ItemsCount;
+use divan::{Bencher, black_box};
+
+fn main() {
+    divan::main();
+}
+
+/// 81 views by 81 lights, as in the Bonn sets.
+fn arrangement() -> Arrangement {
+    let views: Vec<Direction> = btfkit_formats::ubo2003::directions_81()
+        .iter()
+        .map(|angles| Direction::from_degrees(angles.theta_deg(), angles.phi_deg()))
+        .collect();
+    Arrangement::new(&views, 81)
+}
+
+fn bytes(count: usize, salt: u32) -> Vec<u8> {
+    let hash = Hash::new(1, salt);
+    (0..count.div_ceil(16) as u32)
+        .flat_map(|n| hash.words(n, 0, 0).map(u32::to_le_bytes))
+        .flatten()
+        .take(count)
+        .collect()
+}
+
+fn normals(count: u32, salt: u32) -> Vec<[f32; 3]> {
+    let hash = Hash::new(2, salt);
+    let normal = |n| {
+        let [x, y, ..] = hash.normals(n, 0, 0).map(|z| 0.2 * z);
+        let length = (x * x + y * y + 1.0).sqrt();
+        [x / length, y / length, 1.0 / length].map(|v| v as f32)
+    };
+    (0..count).map(normal).collect()
+}
+
+/// Distances of (1): 64 texels to 64 centres.
+#[divan::bench(args = Kernel::available())]
+fn distances(bencher: Bencher<'_, '_>, kernel: Kernel) {
+    let arrangement = arrangement();
+    let (points, centres) = (bytes(64 * arrangement.stride(), 0), bytes(64 * arrangement.stride(), 1));
+    let mut found = vec![0; 64 * 64];
+    bencher.counter(ItemsCount::new(64usize * 64)).bench_local(|| {
+        kernel.distances(
+            black_box(&points),
+            &centres,
+            arrangement.stride(),
+            arrangement.groups(),
+            black_box(&mut found),
+        );
+    });
+}
+
+/// L* codes of 8-bit colours.
+#[divan::bench]
+fn lightness_codes(bencher: Bencher<'_, '_>) {
+    let codes = LightnessCodes::new(Transfer::Srgb, 3, 1.0);
+    let samples = bytes(3 << 16, 0);
+    bencher.counter(ItemsCount::new(1usize << 16)).bench(|| {
+        black_box(&samples).chunks_exact(3).map(|sample| u64::from(codes.code(sample).0)).sum::<u64>()
+    });
+}
+
+/// The 16 nearest of the normals of a 137 x 142 tile.
+#[divan::bench]
+fn nearest_normals(bencher: Bencher<'_, '_>) {
+    let tree = NearestNormals::new(&normals(137 * 142, 0));
+    let queries = normals(4096, 1);
+    let mut found = [Neighbour { distance: 0.0, texel: 0 }; 16];
+    bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
+        for &query in &queries {
+            tree.find(query, black_box(&mut found));
+        }
+    });
+}
+
+/// Rows of a synthesised field, 1024 texels wide.
+#[divan::bench(args = [Kind::Car3d, Kind::Car2d])]
+fn synthesis(bencher: Bencher<'_, '_>, kind: Kind) {
+    // White noise smoothed by its neighbours, so that the fit takes a neighbourhood of some size.
+    let noise: Vec<f64> = normals(64 * 64, 2).into_iter().flatten().map(f64::from).collect();
+    let smooth =
+        (0..noise.len()).map(|n| (0..5).map(|k| noise[(n + k * 195) % noise.len()]).sum::<f64>() / 5.0);
+    let field = Field::new(64, 64, 3, smooth.collect()).expect("64 x 64 x 3 samples");
+    let options = Options { kind, levels: Some(3), boundary: Boundary::Periodic };
+    let model = fit(&field, &options).expect("a field that can be fitted");
+    let mut row = vec![0.0; 1024 * 3];
+    bencher
+        .counter(ItemsCount::new(64usize * 1024))
+        .with_inputs(|| Synthesis::new(&model, 1, 64, 1024).expect("a model that can be synthesised"))
+        .bench_local_values(|mut field| {
+            for _ in 0..64 {
+                field.next_row(black_box(&mut row)).expect("64 rows");
+            }
+        });
+}

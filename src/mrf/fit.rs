@@ -79,15 +79,18 @@ fn fit_level(band: &Field, options: &Options) -> Result<Level> {
         let mut level = estimate(&moments, &sets[n], &prior, options.kind)?;
         level.size = size;
         level.log_evidence = evidence[n];
+        let mut damped = "";
         if level.radius >= STABLE_RADIUS {
             tried.push(format!("{} neighbours have radius {:.4}", sets[n].len(), level.radius));
             if n > 0 {
                 continue;
             }
             damp(&mut level, &moments, options.kind)?;
+            damped = ", Gamma damped";
         }
+        let (sites, radius) = (sets[n].len(), level.radius);
         level.note = (!tried.is_empty())
-            .then(|| format!("{}: {} taken, radius {:.4}", tried.join(", "), sets[n].len(), level.radius));
+            .then(|| format!("{}: {sites} taken{damped}, radius {radius:.4}", tried.join(", ")));
         return Ok(level);
     }
     Err(Error::internal("no neighbourhood to choose from"))
@@ -295,7 +298,8 @@ mod tests {
                 assert!(!is_damped || level.radius > 0.9, "more than needed: {}", level.radius);
                 assert_eq!(note.contains(", 2 neighbours have radius 1."), is_damped, "{note}");
                 assert!(note.contains("4 neighbours have radius 1."), "{note}");
-                assert!(note.ends_with(&format!("2 taken, radius {:.4}", level.radius)), "{note}");
+                let how = if is_damped { ", Gamma damped" } else { "" };
+                assert!(note.ends_with(&format!("2 taken{how}, radius {:.4}", level.radius)), "{note}");
             }
         }
     }

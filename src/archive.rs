@@ -7,11 +7,10 @@ use std::path::{Path, PathBuf};
 use btfkit_formats::Limits;
 use btfkit_formats::ubo2003::Catalogue;
 use btfkit_formats::zip::ZipIndex;
-use bytes::Bytes;
 
 use crate::error::{Error, Result};
 use crate::run::recipe;
-use crate::store::mapped::map_file;
+use crate::store::mapped::MappedFile;
 
 /// Folders below the archive's own that are looked into.
 const FOLDER_DEPTH: usize = 8;
@@ -27,7 +26,7 @@ pub struct Archive {
 }
 
 enum Container {
-    Zip { bytes: Bytes, index: ZipIndex },
+    Zip { file: MappedFile, index: ZipIndex },
     Folder { files: Vec<PathBuf> },
 }
 
@@ -44,14 +43,16 @@ impl Archive {
             let names = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
             (Container::Folder { files }, names)
         } else {
-            let bytes = map_file(path).map_err(|error| Error::io("read", path, error))?;
-            let index = ZipIndex::open(&bytes, &limits).map_err(|error| {
+            let file = MappedFile::open(path).map_err(|error| Error::io("read", path, error))?;
+            let index = ZipIndex::open(file.as_ref(), &limits).map_err(|error| {
                 Error::from(error)
                     .context(path.display())
                     .hint("expected a zip archive in UBO2003's layout, or a folder of its images")
             })?;
+            // Listing has touched a header beside every image.
+            file.release(0..file.as_ref().len());
             let names = index.entries().iter().map(|entry| entry.name().to_owned()).collect();
-            (Container::Zip { bytes, index }, names)
+            (Container::Zip { file, index }, names)
         };
         let names: Vec<String> = names;
         let catalogue = Catalogue::from_names(names.iter().map(String::as_str)).map_err(|errors| {
@@ -89,13 +90,23 @@ impl Archive {
             .image(view, light)
             .ok_or_else(|| Error::internal(format!("no image of view {view}, light {light}")))?;
         match &self.container {
-            Container::Zip { bytes, index } => {
-                index.read(bytes, entry).map_err(|error| Error::from(error).context(self.path.display()))
-            }
+            Container::Zip { file, index } => index
+                .read(file.as_ref(), entry)
+                .map_err(|error| Error::from(error).context(self.path.display())),
             Container::Folder { files } => {
                 let file = &files[entry];
-                let bytes = map_file(file).map_err(|error| Error::io("read", file, error))?;
-                Ok(Cow::Owned(bytes.to_vec()))
+                fs::read(file).map(Cow::Owned).map_err(|error| Error::io("read", file, error))
+            }
+        }
+    }
+
+    /// Gives back the memory of an image that has been used: pages of a mapped archive count as resident.
+    pub fn release(&self, view: usize, light: usize) {
+        if let (Container::Zip { file, index }, Some(entry)) =
+            (&self.container, self.catalogue.image(view, light))
+        {
+            if let Some(entry) = index.entries().get(entry) {
+                file.release(entry.compressed_range());
             }
         }
     }

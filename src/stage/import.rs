@@ -97,6 +97,7 @@ fn check_images(archive: &Archive) -> Result<jpeg::Header> {
             jpeg::check(&bytes, archive.limits())
                 .map_err(|error| error.in_entry(archive.image_name(view, light)).into())
         });
+        archive.release(view, light);
         match (header, &first) {
             (Err(error), _) => problems.push(error.to_string()),
             (Ok(header), None) => first = Some(header),
@@ -195,6 +196,7 @@ impl Plan {
                 let image = self.archive.image_bytes(view, light).and_then(|bytes| {
                     jpeg::decode(&bytes, self.archive.limits()).map_err(|error| error.in_entry(name).into())
                 });
+                self.archive.release(view, light);
                 match image {
                     Ok(image) => images.push(image.samples),
                     Err(error) => problems.push(error.to_string()),

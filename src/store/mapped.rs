@@ -8,6 +8,7 @@ use std::collections::hash_map::RandomState;
 use std::fs::{self, File};
 use std::hash::BuildHasher;
 use std::io::{self, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -23,6 +24,9 @@ use crate::error::{Error, Result};
 
 /// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`.
 const TEMPORARY: &str = ".tmp-";
+
+/// Bytes that the system maps around a page that is touched.
+const TOUCHED_TOGETHER: usize = 64 << 10;
 
 /// Age after which a temporary file of another host counts as abandoned.
 const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
@@ -124,21 +128,55 @@ fn is_abandoned(path: &Path) -> bool {
     dead || old
 }
 
-/// Maps a file for reading.
-///
-/// # Errors
-/// Those of opening and mapping.
-#[allow(unsafe_code)]
-pub fn map_file(path: &Path) -> io::Result<Bytes> {
-    let file = File::open(path)?;
-    if file.metadata()?.len() == 0 {
-        return Ok(Bytes::new());
+/// A file mapped for reading.
+pub struct MappedFile {
+    /// None for an empty file, which cannot be mapped.
+    map: Option<memmap2::Mmap>,
+}
+
+impl MappedFile {
+    /// Maps a file.
+    ///
+    /// # Errors
+    /// Those of opening and mapping.
+    #[allow(unsafe_code)]
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let file = File::open(path)?;
+        if file.metadata()?.len() == 0 {
+            return Ok(Self { map: None });
+        }
+        // SAFETY: the map is only read. A file that another process truncates while it is mapped can end
+        // this process by SIGBUS; stores are replaced by rename and never truncated, and an archive that
+        // is cut short during its own import is beyond saving.
+        let map = unsafe { memmap2::Mmap::map(&file)? };
+        Ok(Self { map: Some(map) })
     }
-    // SAFETY: the map is only read. A file that another process truncates while it is mapped can end
-    // this process by SIGBUS; stores are replaced by rename and never truncated, and an archive that
-    // is cut short during its own import is beyond saving.
-    let map = unsafe { memmap2::Mmap::map(&file)? };
-    Ok(Bytes::from_owner(map))
+
+    /// Gives the pages of a range back to the system, so that they no longer count as resident; they
+    /// are read anew when touched again.
+    #[allow(unsafe_code)]
+    pub fn release(&self, range: Range<usize>) {
+        let Some(map) = &self.map else { return };
+        let start = range.start / TOUCHED_TOGETHER * TOUCHED_TOGETHER;
+        let end = range.end.next_multiple_of(TOUCHED_TOGETHER).min(map.len());
+        if start < end {
+            // SAFETY: of a shared mapping that is only read, pages that are dropped come back from the
+            // file with the same bytes, also under another thread that is reading them.
+            let _ =
+                unsafe { map.unchecked_advise_range(memmap2::UncheckedAdvice::DontNeed, start, end - start) };
+        }
+    }
+}
+
+impl AsRef<[u8]> for MappedFile {
+    fn as_ref(&self) -> &[u8] {
+        self.map.as_deref().unwrap_or_default()
+    }
+}
+
+/// Maps a file as shared bytes.
+fn map_file(path: &Path) -> io::Result<Bytes> {
+    Ok(Bytes::from_owner(MappedFile::open(path)?))
 }
 
 fn storage_error(path: &Path, action: &str, error: &io::Error) -> StorageError {

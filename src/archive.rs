@@ -102,12 +102,11 @@ impl Archive {
 
     /// Gives back the memory of an image that has been used: pages of a mapped archive count as resident.
     pub fn release(&self, view: usize, light: usize) {
-        if let (Container::Zip { file, index }, Some(entry)) =
-            (&self.container, self.catalogue.image(view, light))
+        if let Container::Zip { file, index } = &self.container
+            && let Some(entry) =
+                self.catalogue.image(view, light).and_then(|entry| index.entries().get(entry))
         {
-            if let Some(entry) = index.entries().get(entry) {
-                file.release(entry.compressed_range());
-            }
+            file.release(entry.compressed_range());
         }
     }
 

@@ -74,11 +74,14 @@ impl Model {
     /// Opens a model, or begins one where there is none.
     pub fn create(path: &Path) -> Result<Self> {
         let store = Store::at(path);
+        store.attributes()?;
+        let lock = store.lock("")?;
         if store.attributes()?.is_none() {
             let value =
                 json!({"kind": KIND, "format": FORMAT, "version": env!("CARGO_PKG_VERSION"), "stages": {}});
             store.write_group("", value.as_object().cloned().unwrap_or_default())?;
         }
+        drop(lock);
         store.expect(KIND)?;
         store.sweep()?;
         Ok(Self { store })

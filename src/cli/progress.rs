@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use btfkit::run::progress::{Counted, Progress};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 /// Least time between two JSON lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
@@ -28,16 +28,18 @@ impl Progress for Bars {
     fn begin(&self, title: &str, total: u64, counted: Counted) {
         let template = match counted {
             Counted::Items(_) => {
-                "{prefix:>20} {bar:32} {human_pos}/{human_len} ({per_sec}, {eta} left) {wide_msg}"
+                "{prefix:>20} {bar:32} {human_pos}/{human_len} ({rate}, {eta} left) {wide_msg}"
             }
             Counted::Bytes => {
                 "{prefix:>20} {bar:32} {bytes}/{total_bytes} ({bytes_per_sec}, {eta} left) {wide_msg}"
             }
         };
         let bar = ProgressBar::new(total).with_prefix(title.to_owned());
-        bar.set_style(
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
+        let rate = |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+            let _ = write!(to, "{:.0}/s", state.per_sec());
+        };
+        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        bar.set_style(style.with_key("rate", rate));
         if let Counted::Items(name) = counted {
             bar.set_message(name);
         }

@@ -9,7 +9,6 @@ use btfkit_formats::ubo2003::Catalogue;
 use btfkit_formats::zip::ZipIndex;
 
 use crate::error::{Error, Result};
-use crate::run::recipe;
 use crate::store::mapped::MappedFile;
 
 /// Folders below the archive's own that are looked into.
@@ -110,20 +109,12 @@ impl Archive {
         }
     }
 
-    /// Digest of all images, in the order of the directions: the same for a zip and for a folder of its files.
-    pub fn digest(&self) -> Result<String> {
-        let (views, lights) = (self.catalogue.views().len(), self.catalogue.lights().len());
-        let mut sums = Vec::with_capacity(views * lights * 4);
-        for view in 0..views {
-            for light in 0..lights {
-                let sum = match (&self.container, self.catalogue.image(view, light)) {
-                    (Container::Zip { index, .. }, Some(entry)) => index.entries()[entry].crc32(),
-                    _ => crc32fast::hash(&self.image_bytes(view, light)?),
-                };
-                sums.extend_from_slice(&sum.to_le_bytes());
-            }
+    /// CRC-32 of an image whose bytes these are: the same in a zip, which has it listed, and in a folder.
+    pub fn checksum(&self, view: usize, light: usize, bytes: &[u8]) -> u32 {
+        match (&self.container, self.catalogue.image(view, light)) {
+            (Container::Zip { index, .. }, Some(entry)) => index.entries()[entry].crc32(),
+            _ => crc32fast::hash(bytes),
         }
-        Ok(recipe::digest_bytes(&sums))
     }
 }
 

@@ -385,9 +385,7 @@ impl Compare {
         let model = Model::open(&self.model)?;
         let measurement = Measurement::open(&self.measurement)?;
         let tile = model.tile()?;
-        let bounds = image::of_measurement(&measurement, self.view, self.light, tile.bounds(), context)?;
-        let pixels = tile.offsets_in_bounds().into_iter().map(|at| bounds.pixels[at]).collect();
-        let measured = Picture::linear(tile.size, pixels);
+        let measured = image::of_measured_tile(&measurement, &tile, self.view, self.light, context)?;
         let colors = image::cluster_colors(&model, self.view, self.light)?;
         let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);

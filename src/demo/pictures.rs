@@ -7,12 +7,13 @@ use base64::engine::general_purpose::STANDARD;
 use btfkit_formats::jpeg::{Chroma, EncodeOptions, encode};
 
 use crate::error::{Error, Result};
-use crate::picture::{Picture, false_color, write_file};
+use crate::picture::{Picture, false_color};
 use crate::run::Context;
 use crate::shape::{Size, Window};
-use crate::stage::image::{cluster_colors, look_up, of_measurement};
-use crate::stage::tile::{features, uncut};
+use crate::stage::image::{cluster_colors, look_up, of_measured_tile, of_measurement};
+use crate::stage::tile::features;
 use crate::store::enlarged::Enlarged;
+use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::texel::companion::{Companion, companion, stands_at};
@@ -154,7 +155,7 @@ impl Workshop {
             }
             Subject::Tile => measured(tile)?,
             Subject::Seams => false_color::seams(&measured(tile)?, &self.cut.beyond),
-            Subject::PatchRepeated => measured(&uncut(self.cut.patch))?.repeated(repeats),
+            Subject::PatchRepeated => measured(&self.cut.patch.uncut())?.repeated(repeats),
             Subject::TileRepeated => measured(tile)?.repeated(repeats),
             Subject::Clusters => false_color::index(tile.size, &self.tile_index),
             Subject::Modelled => self.modelled(tile.size, &self.tile_index, Lit::REFERENCE)?,
@@ -184,9 +185,7 @@ impl Workshop {
     /// Measured samples of the texels of a tile.
     fn measured(&self, tile: &Tile, lit: Lit, context: &Context<'_>) -> Result<Picture> {
         let [view, light] = lit.directions();
-        let bounds = of_measurement(&self.measurement, view, light, tile.bounds(), context)?;
-        let pixels = tile.offsets_in_bounds().into_iter().map(|at| bounds.pixels[at]).collect();
-        Ok(Picture::linear(tile.size, pixels))
+        of_measured_tile(&self.measurement, tile, view, light, context)
     }
 
     /// Values of the model, (27).

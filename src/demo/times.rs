@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::picture::write_file;
 use crate::run::recipe;
+use crate::store::mapped::write_file;
 
 /// A step and the time that it took.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::color::srgb_encode_u8;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
-use crate::store::mapped::write_atomically;
+use crate::store::mapped::write_file;
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -174,11 +174,6 @@ impl Ending {
     }
 }
 
-/// Writes a file so that it appears whole or not at all.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -190,8 +185,8 @@ mod tests {
 
     #[test]
     fn an_exr_holds_the_values_themselves() {
-        let bytes = picture().exr().unwrap();
         use exr::prelude::{ReadChannels, ReadLayers};
+        let bytes = picture().exr().unwrap();
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()

@@ -14,6 +14,7 @@ use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model};
 use crate::texel::direction::Direction;
 use crate::texel::evaluate::{Appearance, add};
+use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
 
 /// Rows of a measurement read at a time: a row of chunks.
@@ -130,6 +131,19 @@ pub fn of_measurement(
         }
     }
     Ok(Picture::linear(window.size, pixels.into_iter().map(|p| p.map(|value| value as f32)).collect()))
+}
+
+/// Measured values of the texels of a tile.
+pub fn of_measured_tile(
+    measurement: &Measurement,
+    tile: &Tile,
+    view: Direction,
+    light: Direction,
+    context: &Context<'_>,
+) -> Result<Picture> {
+    let bounds = of_measurement(measurement, view, light, tile.bounds(), context)?;
+    let pixels = tile.offsets_in_bounds().into_iter().map(|at| bounds.pixels[at]).collect();
+    Ok(Picture::linear(tile.size, pixels))
 }
 
 /// Linear RGB of every cluster of a model under a light, seen from a view.

@@ -11,7 +11,7 @@ use crate::archive::Archive;
 use crate::color::{LightnessCodes, Transfer};
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::{self, METHOD};
 use crate::run::{Context, units};
 use crate::shape::Size;
 use crate::store::measurement::{Description, Measurement};
@@ -58,7 +58,7 @@ pub struct Report {
 /// Lists the archive, checks that all images have one size, and fixes the recipe.
 pub fn plan(options: &Options) -> Result<Plan> {
     let archive = Archive::open(&options.archive)?;
-    let header = check_images(&archive)?;
+    let (header, checksums) = check_images(&archive)?;
     let degrees = |angles: &[btfkit_formats::ubo2003::Angles]| -> Vec<[f64; 2]> {
         angles.iter().map(|angles| [angles.theta_deg(), angles.phi_deg()]).collect()
     };
@@ -80,20 +80,23 @@ pub fn plan(options: &Options) -> Result<Plan> {
         "size": [header.height, header.width, u32::from(header.channels)],
         "views": degrees(archive.catalogue().views()),
         "lights": degrees(archive.catalogue().lights()),
-        "images": archive.digest()?,
+        "images": recipe::digest_bytes(&checksums),
         "transfer": options.transfer,
         "white": options.white,
     });
     Ok(Plan { archive, store: options.store.clone(), description, recipe })
 }
 
-/// Checks the structure of every image (not its pixels) and that all have one size; returns the first header.
-fn check_images(archive: &Archive) -> Result<jpeg::Header> {
+/// Checks the structure of every image (not its pixels) and that all have one size; returns the first header and
+/// the checksums of all, in the order of the directions.
+fn check_images(archive: &Archive) -> Result<(jpeg::Header, Vec<u8>)> {
     let (views, lights) = (archive.catalogue().views().len(), archive.catalogue().lights().len());
     let mut first = None;
+    let mut checksums = Vec::with_capacity(4 * views * lights);
     let mut problems = Vec::new();
     for (view, light) in (0..views).flat_map(|view| (0..lights).map(move |light| (view, light))) {
         let header = archive.image_bytes(view, light).and_then(|bytes| {
+            checksums.extend(archive.checksum(view, light, &bytes).to_le_bytes());
             jpeg::check(&bytes, archive.limits())
                 .map_err(|error| error.in_entry(archive.image_name(view, light)).into())
         });
@@ -119,7 +122,8 @@ fn check_images(archive: &Archive) -> Result<jpeg::Header> {
         }
     }
     fail_on(archive.path(), &problems, "replace these images and run the same command again")?;
-    first.ok_or_else(|| Error::input(format!("{}: no images", archive.path().display())))
+    let first = first.ok_or_else(|| Error::input(format!("{}: no images", archive.path().display())))?;
+    Ok((first, checksums))
 }
 
 impl Plan {

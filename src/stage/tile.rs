@@ -159,7 +159,7 @@ impl Plan {
         };
         let description = self.measurement.description();
         let plane = description.size;
-        let features = self.features(context)?;
+        let features = features(&self.measurement, context)?;
         let (tile, patch) = context.install(|| match &self.range {
             None => (Tile::whole(plane, self.choice == Choice::Periodic), None),
             Some(range) => {
@@ -172,7 +172,7 @@ impl Plan {
             wraps: tile.wraps,
             patch,
             seam_visibility: if tile.wraps { seam_visibility(&features, &tile) } else { 1.0 },
-            uncut_visibility: patch.map_or(1.0, |patch| seam_visibility(&features, &uncut(patch))),
+            uncut_visibility: patch.map_or(1.0, |patch| seam_visibility(&features, &patch.uncut())),
             transfer: description.transfer,
             measurement_size: [plane.height, plane.width],
         };
@@ -180,10 +180,6 @@ impl Plan {
         model.write_tile(&tile)?;
         model.finish(Stage::Tile, &self.recipe, &report)?;
         Ok(report)
-    }
-
-    fn features(&self, context: &Context<'_>) -> Result<Features> {
-        features(&self.measurement, context)
     }
 }
 
@@ -212,14 +208,4 @@ pub(crate) fn features(measurement: &Measurement, context: &Context<'_>) -> Resu
     }
     context.progress.end();
     Ok(Features { size: description.size, count, codes })
-}
-
-/// The patch as it is, repeated without a cut.
-pub(crate) fn uncut(patch: Patch) -> Tile {
-    let size = Size::new(patch.height, patch.width);
-    let mut tile = Tile::whole(size, true);
-    for source in &mut tile.source {
-        *source = [source[0] + patch.y as u32, source[1] + patch.x as u32];
-    }
-    tile
 }

@@ -44,7 +44,7 @@ impl Enlarged {
     pub fn create(path: &Path, description: &Description, recipe: &Value, model: &Path) -> Result<Self> {
         let store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
-        store.begin(KIND, recipe, &json!({"model_name": model_name}))?;
+        store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}))?;
         let wide = description.clusters > 256;
         let index = if wide {
             create::<u16>(&store, description.size)

@@ -74,7 +74,7 @@ impl MappedStorage {
 }
 
 /// Writes `bytes` to `path` so that it appears whole or not at all, also after a power failure.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // A folder that is made now has to reach the disk as an entry of its parent.
     let made: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.exists()).collect();
@@ -94,6 +94,11 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     })
 }
 
+/// [`write_atomically`] with an error that names the file.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
+}
+
 /// The temporary name beside `path`: process ids repeat across hosts, so it bears host, pid and random bits.
 pub(crate) fn temporary_name(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -101,7 +106,8 @@ pub(crate) fn temporary_name(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{TEMPORARY}{}-{}-{random:08x}", host(), std::process::id()))
 }
 
-fn host() -> String {
+/// The name of this host as temporary files bear it.
+pub fn host() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
     let name: String =
         name.trim().chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();

@@ -99,10 +99,10 @@ impl Measurement {
     ) -> Result<Self> {
         let store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
-        store.begin(
+        store.begin_by_recipe(
             KIND,
             recipe,
-            &json!({
+            json!({
                 "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
             }),
         )?;

@@ -157,31 +157,41 @@ impl Store {
         }
     }
 
+    /// Begins a store of this kind with these attributes, unless there is one; returns those that hold.
+    ///
+    /// # Errors
+    /// Where there is something else.
+    pub fn begin(&self, kind: &str, attributes: Map<String, Value>) -> Result<Map<String, Value>> {
+        // Looked at before the lock, which leaves a file: none in a folder that is not ours.
+        self.attributes()?;
+        let _lock = self.lock("")?;
+        if self.attributes()?.is_none() {
+            let own = [
+                ("kind", json!(kind)),
+                ("format", json!(FORMAT)),
+                ("version", json!(env!("CARGO_PKG_VERSION"))),
+            ];
+            let own = own.into_iter().map(|(name, value)| (name.to_owned(), value));
+            self.write_group("", own.chain(attributes).collect())?;
+        }
+        self.expect(kind)
+    }
+
     /// Begins a store of this kind, or goes on with the one that the same recipe began; `more` are
     /// attributes beside the recipe.
     ///
     /// # Errors
     /// [`Kind::Recipe`] where another recipe's store lies there.
-    pub fn begin(&self, kind: &str, recipe: &Value, more: &Value) -> Result<()> {
-        self.attributes()?;
-        let _lock = self.lock("")?;
-        if let Some(found) = self.attributes()? {
-            self.expect(kind)?;
-            recipe::expect_same(&self.path, &found, recipe)?;
-            return self.sweep();
+    pub fn begin_by_recipe(&self, kind: &str, recipe: &Value, more: Value) -> Result<()> {
+        let mut attributes = Map::new();
+        attributes.insert("recipe".to_owned(), recipe.clone());
+        attributes.insert("digest".to_owned(), json!(recipe::digest(recipe)));
+        if let Value::Object(more) = more {
+            attributes.extend(more);
         }
-        let mut attributes = json!({
-            "kind": kind,
-            "format": FORMAT,
-            "version": env!("CARGO_PKG_VERSION"),
-            "recipe": recipe,
-            "digest": recipe::digest(recipe),
-        });
-        let attributes = attributes.as_object_mut().map(std::mem::take).unwrap_or_default();
-        self.write_group(
-            "",
-            attributes.into_iter().chain(more.as_object().cloned().unwrap_or_default()).collect(),
-        )
+        let found = self.begin(kind, attributes)?;
+        recipe::expect_same(&self.path, &found, recipe)?;
+        self.sweep()
     }
 
     fn occupied(&self) -> Error {
@@ -213,7 +223,7 @@ impl Store {
         let text =
             serde_json::to_vec_pretty(&metadata).map_err(|error| Error::internal(error.to_string()))?;
         let file = self.path.join(group).join("zarr.json");
-        mapped::write_atomically(&file, &text).map_err(|error| Error::io("write", &file, error))
+        mapped::write_file(&file, &text)
     }
 
     /// Makes an array ready to be written chunk by chunk; its metadata is written, its data is not touched.
@@ -237,7 +247,7 @@ impl Store {
             builder.build(self.storage.clone(), &format!("/{name}")).map_err(|error| failed(&error))?;
         array
             .store_metadata_opt(&ArrayMetadataOptions::default().with_include_zarrs_metadata(false))
-            .map_err(|error| self.write_error(&error.into()))?;
+            .map_err(|error| write_error(&error.into()))?;
         Ok(array)
     }
 
@@ -273,7 +283,7 @@ impl Store {
     pub fn write_chunk<T: Named>(&self, array: &Array, indices: &[u64], elements: Vec<T>) -> Result<()> {
         // One thread: a shard's bytes must not depend on which of its chunks was encoded first.
         let options = CodecOptions::default().with_store_empty_chunks(true).with_concurrent_target(1);
-        array.store_chunk_opt(indices, elements, &options).map_err(|error| self.write_error(&error))
+        array.store_chunk_opt(indices, elements, &options).map_err(|error| write_error(&error))
     }
 
     /// Whether a chunk (or shard) has been written.
@@ -353,12 +363,12 @@ impl Store {
             "the store is damaged: delete what the message names and run the command that made it again",
         )
     }
+}
 
-    fn write_error(&self, error: &zarrs::array::ArrayError) -> Error {
-        let mut failed = Error::new(Kind::Io, error.to_string());
-        if error.to_string().contains("No space left") {
-            failed = failed.hint("free some space and run the same command again");
-        }
-        failed
+fn write_error(error: &zarrs::array::ArrayError) -> Error {
+    let mut failed = Error::new(Kind::Io, error.to_string());
+    if error.to_string().contains("No space left") {
+        failed = failed.hint("free some space and run the same command again");
     }
+    failed
 }

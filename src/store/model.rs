@@ -14,7 +14,7 @@ use crate::run::recipe;
 use crate::shape::Size;
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
-use crate::store::{FORMAT, Layout, Lock, Named, Store};
+use crate::store::{Layout, Lock, Named, Store};
 use crate::texel::direction::Direction;
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
@@ -74,15 +74,9 @@ impl Model {
     /// Opens a model, or begins one where there is none.
     pub fn create(path: &Path) -> Result<Self> {
         let store = Store::at(path);
-        store.attributes()?;
-        let lock = store.lock("")?;
-        if store.attributes()?.is_none() {
-            let value =
-                json!({"kind": KIND, "format": FORMAT, "version": env!("CARGO_PKG_VERSION"), "stages": {}});
-            store.write_group("", value.as_object().cloned().unwrap_or_default())?;
-        }
-        drop(lock);
-        store.expect(KIND)?;
+        let mut attributes = Map::new();
+        attributes.insert("stages".to_owned(), json!({}));
+        store.begin(KIND, attributes)?;
         store.sweep()?;
         Ok(Self { store })
     }

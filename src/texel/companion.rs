@@ -187,7 +187,7 @@ mod tests {
         let size = Size::new(120, 120);
         let mut features = plane(size, noise);
         let patch = Patch { y: 0, x: 0, height: 40, width: 48, overlap: 10 };
-        let first = Cut { tile: Tile { wraps: true, ..window(patch) }, patch, beyond: vec![0; 40 * 48] };
+        let first = Cut { tile: patch.uncut(), patch, beyond: vec![0; 40 * 48] };
         for row in 0..40 {
             for column in 0..48 {
                 let agrees = |depth: usize, at: usize| at == depth || at == depth + 1;
@@ -201,15 +201,6 @@ mod tests {
         let border = Border::between(&features, &first, [60, 60]);
         assert_eq!(border.cost, 0);
         assert_eq!((border.left[20], border.right[20], border.top[24], border.bottom[24]), (3, 4, 5, 6));
-    }
-
-    /// A patch as it is.
-    fn window(patch: Patch) -> Tile {
-        let mut tile = Tile::whole(Size::new(patch.height, patch.width), false);
-        for [row, column] in &mut tile.source {
-            (*row, *column) = (*row + patch.y as u32, *column + patch.x as u32);
-        }
-        tile
     }
 
     #[test]

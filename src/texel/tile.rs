@@ -88,6 +88,17 @@ pub struct Patch {
     pub overlap: usize,
 }
 
+impl Patch {
+    /// The patch as it is, taken for a tile that wraps without a cut.
+    pub fn uncut(self) -> Tile {
+        let mut tile = Tile::whole(Size::new(self.height, self.width), true);
+        for [row, column] in &mut tile.source {
+            (*row, *column) = (*row + self.y as u32, *column + self.x as u32);
+        }
+        tile
+    }
+}
+
 /// A tile with the patch that it was cut from and the places of its seams.
 pub struct Cut {
     /// The tile.

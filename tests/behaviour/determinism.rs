@@ -1,6 +1,8 @@
 //! The same bytes whatever the threads, the kernel, the band and the form of the archive.
 
-use crate::fixture::{ENLARGED, assert_same, btf, fixture, succeed, unpack};
+use std::process::Command;
+
+use crate::fixture::{assert_same, btf, enlarge, fixture, succeed, unpack};
 
 #[test]
 fn threads_and_kernels_change_no_byte() {
@@ -8,21 +10,12 @@ fn threads_and_kernels_change_no_byte() {
     for (name, threads, kernel) in [("one", "1", "plain"), ("three", "3", "")] {
         let [measurement, model, enlarged] = ["zarr", "model.zarr", "big.zarr"]
             .map(|end| folder.path().join(name).join(format!("sample.{end}")));
-        let run = |arguments: &[&str], paths: &[&std::path::PathBuf]| {
-            succeed(
-                btf()
-                    .env("BTFKIT_KERNEL", kernel)
-                    .arg(arguments[0])
-                    .args(paths)
-                    .args(&arguments[1..])
-                    .args(["--threads", threads]),
-            )
+        let run = |command: &mut Command| {
+            succeed(command.env("BTFKIT_KERNEL", kernel).args(["--threads", threads]))
         };
-        run(&["import"], &[&fixture().archive(), &measurement]);
-        run(&["model", "--clusters", "24"], &[&measurement, &model]);
-        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-        // The fixture's model has another name, which the recipe of an enlargement records.
-        run(&["enlarge", "--size", &size, "--keep-normals"], &[&model, &enlarged]);
+        run(btf().arg("import").args([&fixture().archive(), &measurement]));
+        run(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        run(&mut enlarge(&model, &enlarged));
     }
     let [one, three] = ["one", "three"].map(|name| folder.path().join(name));
     assert_same(&one, &three);
@@ -34,14 +27,7 @@ fn the_band_height_changes_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     for band in ["1", "7", "600"] {
         let output = folder.path().join(band);
-        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-        succeed(btf().arg("enlarge").args([&fixture().model(), &output]).args([
-            "--size",
-            &size,
-            "--keep-normals",
-            "--band",
-            band,
-        ]));
+        succeed(enlarge(&fixture().model(), &output).args(["--band", band]));
         assert_same(&output, &fixture().enlarged());
     }
 }

@@ -41,8 +41,7 @@ pub fn fixture() -> &'static Fixture {
         );
         succeed(btf().arg("import").args([&archive, &measurement]));
         succeed(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
-        let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-        succeed(btf().arg("enlarge").args([&model, &enlarged]).args(["--size", &size, "--keep-normals"]));
+        succeed(&mut enlarge(&model, &enlarged));
         fixture
     })
 }
@@ -50,6 +49,14 @@ pub fn fixture() -> &'static Fixture {
 pub fn btf() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_btf"));
     command.stdin(Stdio::null());
+    command
+}
+
+/// The enlargement that made the fixture's, of a model to a place.
+pub fn enlarge(model: &Path, output: &Path) -> Command {
+    let mut command = btf();
+    let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
+    command.arg("enlarge").args([model, output]).args(["--size", &size, "--keep-normals"]);
     command
 }
 

@@ -4,10 +4,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::fixture::{ENLARGED, assert_same, btf, fixture, succeed};
+use crate::fixture::{assert_same, btf, enlarge, fixture, succeed};
 
-/// Starts a command, waits until `ready`, and sends `signal`. Returns the exit code, none where it was
-/// killed, and whether the command had already ended.
+/// Starts a command, waits until `ready`, and sends `signal`. Returns the exit code, none where it was killed.
 fn interrupt(command: &mut Command, signal: &str, ready: impl Fn() -> bool) -> Option<i32> {
     let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(60);
@@ -34,8 +33,7 @@ fn an_import_killed_half_way_goes_on_to_the_same_bytes() {
         assert!(code.is_none() || views == 6, "the import ended before it was killed");
     }
     // A kill in the middle of a write leaves a temporary file; this one is as if of a dead process.
-    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let host: String = host.trim().chars().filter(char::is_ascii_alphanumeric).collect();
+    let host = btfkit::store::mapped::host();
     std::fs::write(store.join(format!(".zarr.json.tmp-{host}-999999999-00000000")), b"{").unwrap();
     succeed(btf().arg("import").args([&fixture().archive(), &store]));
     assert_same(&store, &fixture().measurement());
@@ -45,9 +43,7 @@ fn an_import_killed_half_way_goes_on_to_the_same_bytes() {
 fn an_enlargement_killed_half_way_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("killed");
-    let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-    let mut command = btf();
-    command.arg("enlarge").args([&fixture().model(), &output]).args(["--size", &size, "--keep-normals"]);
+    let mut command = enlarge(&fixture().model(), &output);
     // The first row of shards is two shards wide: killed once one of the four is there.
     let code = interrupt(&mut command, "-KILL", || count(&output, "index/c") >= 1);
     assert_eq!(code, None, "the enlargement ended before it was killed");
@@ -60,9 +56,7 @@ fn an_enlargement_killed_half_way_goes_on_to_the_same_bytes() {
 fn an_enlargement_goes_on_after_whole_rows_of_shards() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("half");
-    let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-    let mut command = btf();
-    command.arg("enlarge").args([&fixture().model(), &output]).args(["--size", &size, "--keep-normals"]);
+    let mut command = enlarge(&fixture().model(), &output);
     succeed(&mut command);
     std::fs::remove_dir_all(output.join("index/c/1")).unwrap();
     let told = succeed(&mut command);

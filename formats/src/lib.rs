@@ -46,12 +46,19 @@
     )
 )]
 
+mod contents;
+mod direction;
 mod error;
 pub mod jpeg;
 mod limits;
+pub mod picture;
 mod reader;
+mod samples;
 pub mod ubo2003;
 pub mod zip;
 
+pub use contents::{Contents, Images};
+pub use direction::Direction;
 pub use error::{Error, ErrorKind, Result};
 pub use limits::Limits;
+pub use samples::{SampleType, Samples, f16};

@@ -16,6 +16,12 @@ pub struct Limits {
     pub max_entry_bytes: u64,
     /// Entries of one zip. Default 2^20.
     pub max_entries: u64,
+    /// View or light directions of one archive. Default 2^16.
+    pub max_directions: u64,
+    /// Channels of one image: spectral sets have tens. Default 1024.
+    pub max_channels: u64,
+    /// Bytes of all samples that one call may return or work on. Default 2^32.
+    pub max_decoded_bytes: u64,
 }
 
 impl Default for Limits {
@@ -25,6 +31,9 @@ impl Default for Limits {
             max_scans_per_image: 100,
             max_entry_bytes: 1 << 28,
             max_entries: 1 << 20,
+            max_directions: 1 << 16,
+            max_channels: 1 << 10,
+            max_decoded_bytes: 1 << 32,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 
-/// Reads big-endian fields one after another; errors name the byte where the missing field starts.
+/// Reads fields one after another, big-endian unless the name says `le`; errors name the byte where the missing field starts.
 #[derive(Debug, Clone)]
 pub(crate) struct Reader<'a> {
     bytes: &'a [u8],
@@ -47,5 +47,31 @@ impl<'a> Reader<'a> {
     pub(crate) fn u16(&mut self) -> Result<u16> {
         let pair = self.take(2)?;
         Ok(pair.iter().fold(0, |value, &byte| (value << 8) | u16::from(byte)))
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let mut array = [0; N];
+        array.copy_from_slice(self.take(N)?);
+        Ok(array)
+    }
+
+    pub(crate) fn u32_le(&mut self) -> Result<u32> {
+        Ok(u32::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn i32_le(&mut self) -> Result<i32> {
+        Ok(i32::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn u64_le(&mut self) -> Result<u64> {
+        Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn f32_le(&mut self) -> Result<f32> {
+        Ok(f32::from_le_bytes(self.array()?))
+    }
+
+    pub(crate) fn f64_le(&mut self) -> Result<f64> {
+        Ok(f64::from_le_bytes(self.array()?))
     }
 }

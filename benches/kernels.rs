@@ -8,7 +8,7 @@ use btfkit::kernel::absolute_difference::Kernel;
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
-use btfkit::texel::direction::Direction;
+use btfkit_formats::Direction;
 use btfkit::texel::nearest::{NearestNormals, Neighbour};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -1,12 +1,14 @@
 //! Directions to a light or a viewer.
 
-/// A direction in the sample frame: x along increasing column, y up in the picture, z out of the surface.
-/// Points away from the surface.
+use std::f64::consts::TAU;
+
+/// A direction away from the surface, in the sample frame: x along increasing column, y up in the picture,
+/// z out of the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Direction {
-    /// Polar angle from the surface normal, radians.
+    /// Polar angle from the surface normal, radians; 0 to pi/2 above the surface.
     pub theta_rad: f64,
-    /// Azimuth, counter-clockwise from +x as seen in the picture, radians.
+    /// Azimuth in the surface plane, counter-clockwise from +x (right) towards +y (up), radians.
     pub phi_rad: f64,
 }
 
@@ -16,19 +18,48 @@ impl Direction {
         Direction { theta_rad: theta.to_radians(), phi_rad: phi.to_radians() }
     }
 
+    /// Angles (theta, phi) in degrees, for people.
+    pub fn degrees(self) -> (f64, f64) {
+        (self.theta_rad.to_degrees(), self.phi_rad.to_degrees())
+    }
+
     /// From a vector of any length but zero; phi in 0..2 pi.
     pub fn from_vector([x, y, z]: [f64; 3]) -> Option<Self> {
         let length = (x * x + y * y + z * z).sqrt();
         if !length.is_normal() {
             return None;
         }
-        let theta_rad = (x.hypot(y)).atan2(z);
-        Some(Direction { theta_rad, phi_rad: y.atan2(x).rem_euclid(std::f64::consts::TAU) })
+        let theta_rad = libm::atan2(libm::hypot(x, y), z);
+        Some(Direction { theta_rad, phi_rad: libm::atan2(y, x).rem_euclid(TAU) })
     }
 
     /// The unit vector.
     pub fn vector(self) -> [f64; 3] {
-        let (sin, cos) = self.theta_rad.sin_cos();
-        [sin * self.phi_rad.cos(), sin * self.phi_rad.sin(), cos]
+        let (sin_theta, cos_theta) = libm::sincos(self.theta_rad);
+        let (sin_phi, cos_phi) = libm::sincos(self.phi_rad);
+        [sin_theta * cos_phi, sin_theta * sin_phi, cos_theta]
+    }
+}
+
+impl std::fmt::Display for Direction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (theta, phi) = self.degrees();
+        write!(f, "theta {theta:.4} phi {phi:.4}")
+    }
+}
+
+impl std::str::FromStr for Direction {
+    type Err = String;
+
+    /// `theta,phi` in degrees.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || format!("expected theta,phi in degrees such as 15,0 (theta 0 to 90), got {text:?}");
+        let (theta, phi) = text.split_once(',').ok_or_else(expected)?;
+        let angle = |part: &str| part.trim().parse::<f64>().ok().filter(|a| a.is_finite());
+        let (theta, phi) = (angle(theta).ok_or_else(expected)?, angle(phi).ok_or_else(expected)?);
+        if !(0.0..=90.0).contains(&theta) {
+            return Err(expected());
+        }
+        Ok(Direction::from_degrees(theta, phi.rem_euclid(360.0)))
     }
 }

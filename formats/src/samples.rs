@@ -1,5 +1,7 @@
 //! Samples of the types that measurements come in.
 
+use std::ops::Range;
+
 pub use half::f16;
 
 /// Type of one sample.
@@ -73,6 +75,56 @@ impl Samples {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// One sample on the scale where 1.0 is reflectance 1 (or display white): integers are divided by their
+    /// largest value. No transfer curve is undone. `None` beyond the end.
+    pub fn value(&self, at: usize) -> Option<f64> {
+        match self {
+            Samples::U8(list) => list.get(at).map(|&s| f64::from(s) / 255.0),
+            Samples::U16(list) => list.get(at).map(|&s| f64::from(s) / 65535.0),
+            Samples::F16(list) => list.get(at).map(|&s| s.to_f64()),
+            Samples::F32(list) => list.get(at).map(|&s| f64::from(s)),
+        }
+    }
+
+    /// The samples of some ranges, one after another; `None` where one reaches beyond the end.
+    pub fn select(&self, ranges: impl Iterator<Item = Range<usize>>) -> Option<Samples> {
+        fn selected<T: Copy>(list: &[T], ranges: impl Iterator<Item = Range<usize>>) -> Option<Vec<T>> {
+            let mut found = Vec::new();
+            for range in ranges {
+                found.extend_from_slice(list.get(range)?);
+            }
+            Some(found)
+        }
+        Some(match self {
+            Samples::U8(list) => Samples::U8(selected(list, ranges)?),
+            Samples::U16(list) => Samples::U16(selected(list, ranges)?),
+            Samples::F16(list) => Samples::F16(selected(list, ranges)?),
+            Samples::F32(list) => Samples::F32(selected(list, ranges)?),
+        })
+    }
+
+    /// Adds samples of the same type at the end; returns whether the types agree.
+    pub fn append(&mut self, more: &Samples) -> bool {
+        match (self, more) {
+            (Samples::U8(list), Samples::U8(more)) => list.extend_from_slice(more),
+            (Samples::U16(list), Samples::U16(more)) => list.extend_from_slice(more),
+            (Samples::F16(list), Samples::F16(more)) => list.extend_from_slice(more),
+            (Samples::F32(list), Samples::F32(more)) => list.extend_from_slice(more),
+            _ => return false,
+        }
+        true
+    }
+
+    /// No samples, of a type.
+    pub fn none(sample_type: SampleType) -> Samples {
+        match sample_type {
+            SampleType::U8 => Samples::U8(Vec::new()),
+            SampleType::U16 => Samples::U16(Vec::new()),
+            SampleType::F16 => Samples::F16(Vec::new()),
+            SampleType::F32 => Samples::F32(Vec::new()),
+        }
     }
 
     /// All samples as f32 on the scale where 1.0 is reflectance 1 (or display white): integers are divided by

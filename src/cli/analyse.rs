@@ -10,7 +10,7 @@ use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use btfkit::texel::cluster::centre::CentreRule;
 use btfkit::texel::cluster::lloyd::Limits;
-use btfkit::texel::direction::Direction;
+use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::table::{row, table};

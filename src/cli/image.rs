@@ -5,7 +5,7 @@ use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Window;
 use btfkit::stage::image;
-use btfkit::texel::direction::Direction;
+use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::Tell;

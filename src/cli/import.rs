@@ -1,40 +1,55 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use btfkit::color::Transfer;
-use btfkit::error::Result;
+use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
-use btfkit::stage::import;
+use btfkit::run::progress::{Counted, Progress};
+use btfkit::stage::import::{self, Report, Shard};
+use btfkit::store::chunk::Codec;
+use btfkit::store::measurement::Description;
 use clap::{Args, ValueEnum};
 
+use super::source::SourceArgs;
+use super::table::{row, table};
 use super::{Tell, bytes_text};
 
-/// Archive to measurement: a UBO2003 zip, or folders of its images
+/// Archive to measurement: any of the formats that `btf info` knows, one archive or hundreds
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  btf import UBO_WOOD256.zip
-  btf import MANYFILES/ wood.zarr --threads 2
+  btf import UBO_WOOD256.zip                      makes UBO_WOOD256.zarr here
+  btf import MANYFILES/ wood.zarr --threads 2     a folder of images, or of zips
+  btf import tv*.zip wood.zarr                    one measurement in many pieces: the store is named last
+  btf import *.zip *.btf --into stores            many archives, a store each; a bad one does not stop the others
+  btf import felt.btf --shard 3/8                 the fourth of eight parts of the views, for a job array
+  btf import wall.btf --codec predictive          half the size of the default; zarr-python needs our module to read it
 Interrupted, the same command goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// A zip or a folder
-    archive: PathBuf,
-    /// The measurement to make [default: the archive's name with .zarr, here]
-    store: Option<PathBuf>,
-    /// Transfer curve of the samples
-    #[arg(long, value_enum, default_value = "srgb")]
-    transfer: Curve,
+    /// Archives; the last name is the store to make if it ends in .zarr
+    #[arg(required = true, value_name = "ARCHIVE")]
+    paths: Vec<PathBuf>,
+    /// Folder for the stores of several archives [default: here]
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    #[command(flatten)]
+    source: SourceArgs,
     /// Reflectance that counts as L* = 100
     #[arg(long, default_value_t = 1.0, value_parser = parse_white)]
     white: f64,
+    /// How samples are packed
+    #[arg(long, value_enum, default_value = "stock")]
+    codec: CodecName,
+    /// Import part K of N of the views (K from 0)
+    #[arg(long, value_name = "K/N", default_value = "0/1")]
+    shard: Shard,
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Curve {
-    Srgb,
-    Linear,
+enum CodecName {
+    /// Codecs that stock zarr-python reads.
+    Stock,
 }
 
 fn parse_white(text: &str) -> std::result::Result<f64, String> {
@@ -42,38 +57,158 @@ fn parse_white(text: &str) -> std::result::Result<f64, String> {
     white.ok_or_else(|| format!("expected a reflectance from 0.001 to 1000, got {text:?}"))
 }
 
+/// One archive and its store.
+struct Job {
+    pieces: Vec<PathBuf>,
+    store: PathBuf,
+}
+
 impl Import {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let store = self.store.clone().unwrap_or_else(|| {
-            PathBuf::from(format!("{}.zarr", self.archive.file_stem().unwrap_or_default().to_string_lossy()))
-        });
-        let transfer = match self.transfer {
-            Curve::Srgb => Transfer::Srgb,
-            Curve::Linear => Transfer::Linear,
+        let jobs = self.jobs()?;
+        if let [job] = jobs.as_slice() {
+            return match self.import(job, context, tell)? {
+                Some((description, report)) => {
+                    tell.line(told(&job.store, &description, &report));
+                    Ok(())
+                }
+                None => Ok(()),
+            };
+        }
+        self.import_all(&jobs, context, tell)
+    }
+
+    fn jobs(&self) -> Result<Vec<Job>> {
+        let is_store = |path: &Path| path.extension().is_some_and(|e| e == "zarr");
+        let folder = self.into.clone().unwrap_or_default();
+        match self.paths.split_last() {
+            Some((store, pieces)) if is_store(store) && !pieces.is_empty() => {
+                Ok(vec![Job { pieces: pieces.to_vec(), store: folder.join(store) }])
+            }
+            _ => {
+                let job = |path: &PathBuf| Job {
+                    pieces: vec![path.clone()],
+                    store: import::default_store(path, &folder),
+                };
+                let jobs: Vec<Job> = self.paths.iter().map(job).collect();
+                let mut stores: Vec<&Path> = jobs.iter().map(|job| job.store.as_path()).collect();
+                stores.sort();
+                match stores.windows(2).find(|pair| pair[0] == pair[1]) {
+                    Some(pair) => Err(Error::new(
+                        Kind::Usage,
+                        format!("two archives would both become {}", pair[0].display()),
+                    )
+                    .hint("import them one by one and name the stores")),
+                    None => Ok(jobs),
+                }
+            }
+        }
+    }
+
+    /// Imports one archive; `None` after a dry run.
+    fn import(&self, job: &Job, context: &Context<'_>, tell: Tell) -> Result<Option<(Description, Report)>> {
+        let source = self.source.open(&job.pieces)?;
+        let codec = match self.codec {
+            CodecName::Stock => Codec::Stock,
         };
-        let options = import::Options {
-            archive: self.archive.clone(),
-            store: store.clone(),
-            transfer,
-            white: self.white,
-        };
-        let plan = import::plan(&options)?;
+        let options = import::Options { store: job.store.clone(), white: self.white, codec, shard: self.shard };
+        let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            tell.plan(&plan.summary())?;
+            return Ok(None);
         }
         let report = plan.run(context)?;
-        let description = plan.description();
-        tell.line(format!(
-            "{}: {} views x {} lights of {}, {} raw; {} views written, {} found done, {} samples clipped at white",
-            store.display(),
-            description.views.len(),
-            description.lights.len(),
-            description.size,
-            bytes_text(description.bytes()),
-            report.views_written,
-            report.views_found,
-            report.clipped
-        ));
-        Ok(())
+        Ok(Some((plan.description().clone(), report)))
     }
+
+    /// Imports many archives under one bar; those that fail do not stop the others.
+    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<()> {
+        // Counted before anything is imported: opening an archive is cheap.
+        let images = |job: &Job| {
+            let contents = self.source.open(&job.pieces).map(|source| {
+                (0..source.contents().views.len()).filter(|&view| self.shard.has(view)).count()
+                    * source.contents().lights.len()
+            });
+            contents.map_or(0, |images| images as u64)
+        };
+        let total = jobs.iter().map(images).sum();
+        context.progress.begin("import", total, Counted::Items("images"));
+        let overall = Overall { bar: context.progress };
+        let inner = Context::new(&overall, context.stop, context.threads, context.memory_bytes)?;
+        let mut rows = vec![row!["archive", "store", "views x lights", "size", "raw", "result"]];
+        let mut worst: Option<Error> = None;
+        for job in jobs {
+            let archive = job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
+            context.progress.remark(&archive);
+            let store = job.store.display();
+            match self.import(job, &inner, tell) {
+                Ok(Some((d, report))) => rows.push(row![
+                    archive,
+                    store,
+                    format!("{} x {}", d.views.len(), d.lights.len()),
+                    format!("{} {}", d.size, d.sample_type.name()),
+                    bytes_text(d.bytes()),
+                    format!("{} views written, {} found done", report.views_written, report.views_found)
+                ]),
+                Ok(None) => {}
+                Err(error) if error.kind() == Kind::Stopped => return Err(error),
+                Err(error) => {
+                    rows.push(row![archive, store, "", "", "", format!("failed: {}", first_line(&error.to_string()))]);
+                    worst.get_or_insert(error);
+                }
+            }
+        }
+        context.progress.end();
+        let failed = rows.iter().filter(|row| row[5].starts_with("failed")).count();
+        tell.line(table(&rows));
+        match worst {
+            Some(error) => {
+                Err(error.context(format!("{failed} of {} archives failed, the first of them", jobs.len())))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn told(store: &Path, description: &Description, report: &Report) -> String {
+    let mut text = format!(
+        "{}: {} views x {} lights of {}, {} raw; {} views written, {} found done, {} samples clipped at white",
+        store.display(),
+        description.views.len(),
+        description.lights.len(),
+        description.size,
+        bytes_text(description.bytes()),
+        report.views_written,
+        report.views_found,
+        report.samples.clipped
+    );
+    for (count, what) in [(report.samples.not_finite, "not finite"), (report.samples.negative, "negative")] {
+        if count > 0 {
+            text.push_str(&format!(", {count} {what}"));
+        }
+    }
+    text
+}
+
+fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or_default()
+}
+
+/// The progress of one archive as a part of the whole.
+struct Overall<'a> {
+    bar: &'a dyn Progress,
+}
+
+impl Progress for Overall<'_> {
+    fn begin(&self, _: &str, _: u64, _: Counted) {}
+
+    fn advance(&self, count: u64) {
+        self.bar.advance(count);
+    }
+
+    fn remark(&self, text: &str) {
+        self.bar.remark(text);
+    }
+
+    fn end(&self) {}
 }

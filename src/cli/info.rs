@@ -1,8 +1,8 @@
 use std::path::PathBuf;
 
-use btfkit::archive::Archive;
+use btfkit::archive;
 use btfkit::error::Result;
-use btfkit::stage::cluster;
+use btfkit::stage::{cluster, import};
 use btfkit::store::Store;
 use btfkit::store::enlarged::{self, Enlarged};
 use btfkit::store::measurement::{self, Measurement};
@@ -37,19 +37,13 @@ impl Info {
     }
 
     fn archive(&self) -> Result<Vec<Vec<String>>> {
-        let archive = Archive::open(&self.path)?;
-        let catalogue = archive.catalogue();
-        let first = archive.image_bytes(0, 0)?;
-        let header = btfkit_formats::jpeg::header(&first, archive.limits())?;
-        let (views, lights) = (catalogue.views().len() as u64, catalogue.lights().len() as u64);
-        let bytes =
-            views * lights * u64::from(header.width) * u64::from(header.height) * u64::from(header.channels);
+        let source = archive::open(std::slice::from_ref(&self.path), &archive::Options::default())?;
+        let contents = source.contents();
+        let description = import::describe(source.as_ref(), 1.0);
         Ok(vec![
-            row!["kind", "archive, UBO2003 layout"],
-            row!["views x lights", format!("{views} x {lights}")],
-            row!["images", format!("{}x{}, {} channels", header.width, header.height, header.channels)],
-            row!["raw", bytes_text(bytes)],
-            row!["other entries", catalogue.ignored()],
+            row!["kind", format!("archive, {}", contents.format)],
+            row!["views x lights", format!("{} x {}", contents.views.len(), contents.lights.len())],
+            row!["raw", bytes_text(description.bytes())],
         ])
     }
 
@@ -59,7 +53,7 @@ impl Info {
         Ok(vec![
             row!["kind", measurement::KIND],
             row!["views x lights", format!("{} x {}", description.views.len(), description.lights.len())],
-            row!["size", format!("{}, {} channels", description.size, description.channels)],
+            row!["size", format!("{}, {} channels", description.size, description.n_channels())],
             row!["transfer", format!("{:?}", description.transfer).to_lowercase()],
             row!["raw", bytes_text(description.bytes())],
             row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())],

@@ -8,7 +8,9 @@ mod import;
 mod info;
 mod progress;
 mod sample;
+mod source;
 mod table;
+mod verify;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -74,6 +76,7 @@ enum Command {
     Sample(sample::Sample),
     Info(info::Info),
     Import(import::Import),
+    Verify(verify::Verify),
     Model(analyse::Whole),
     Tile(analyse::Tile),
     Cluster(analyse::Cluster),
@@ -125,6 +128,7 @@ impl Command {
             Self::Sample(command) => command.run(context, tell),
             Self::Info(command) => command.run(tell),
             Self::Import(command) => command.run(context, tell),
+            Self::Verify(command) => command.run(context, tell),
             Self::Model(command) => command.run(context, tell),
             Self::Tile(command) => command.run(context, tell),
             Self::Cluster(command) => command.run(context, tell),

@@ -15,7 +15,7 @@ use serde_json::json;
 
 pub use times::Step;
 
-use crate::color::Transfer;
+use crate::archive;
 use crate::demo::figures::Figures;
 use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
 use crate::demo::story::Section;
@@ -28,6 +28,8 @@ use crate::sample::Kind;
 use crate::shape::Size;
 use crate::stage::tile::Choice;
 use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
+use crate::stage::import::Shard;
+use crate::store::chunk::Codec;
 use crate::store::enlarged::Enlarged;
 use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
@@ -171,14 +173,17 @@ fn measure(
         };
         sample::run(&options, context).map(|_| ())
     })?;
-    let options = import::Options {
-        archive: archive.to_owned(),
-        store: store.to_owned(),
-        transfer: Transfer::Srgb,
-        white: 1.0,
-    };
     let found = Measurement::open(store).is_ok_and(|m| m.views_done() == settings.directions);
-    times.time("import", found, || import::plan(&options)?.run(context).map(|_| ()))
+    times.time("import", found, || {
+        let source = archive::open(&[archive.to_owned()], &archive::Options::default())?;
+        let options = import::Options {
+            store: store.to_owned(),
+            white: 1.0,
+            codec: Codec::Stock,
+            shard: Shard::WHOLE,
+        };
+        import::plan(source.as_ref(), options, context)?.run(context).map(|_| ())
+    })
 }
 
 /// Analyses the measurement.

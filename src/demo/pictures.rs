@@ -17,7 +17,7 @@ use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::texel::companion::{Companion, companion, stands_at};
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 use crate::texel::tile::{Cut, Features, Tile, cut};
 
 /// Pictures with a side above this are embedded as JPEG, smaller ones as PNG.

@@ -1,8 +1,10 @@
 //! Tile to clusters: index, centres, representatives and their distances.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use btfkit_formats::Samples;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -133,7 +135,7 @@ impl Plan {
     fn memory_bytes(&self, threads: usize) -> u64 {
         const PROGRAM_BYTES: usize = 16 << 20;
         let description = self.measurement.description();
-        let texel_bytes = description.lights.len() * description.channels;
+        let texel_bytes = description.texel_bytes();
         let window = self.tile.bounds().size.texels() * texel_bytes;
         let representatives = self.options.clusters * description.views.len() * texel_bytes;
         let vectors = self.tile.size.texels() * self.arrangement().stride();
@@ -232,7 +234,7 @@ impl Plan {
                 / tile_texels as f64,
             representative_from_centre: arrangement.mean_lightness(from_centres) / clusters as f64,
             single_texel_clusters: population.iter().filter(|&&n| n == 1).count(),
-            representative_bytes: representatives.samples.len() as u64,
+            representative_bytes: (representatives.samples.len() * description.sample_type.bytes()) as u64,
             index_bytes: tile_texels as u64 * if clusters <= 256 { 1 } else { 2 },
             tile_bytes: description.bytes() / description.size.texels() as u64 * tile_texels as u64,
             measurement_bytes: description.bytes(),
@@ -244,27 +246,28 @@ impl Plan {
     /// The colour BRDFs of tile texels, [cluster, view, light, channel].
     fn read_representatives(&self, texels: &[usize], context: &Context<'_>) -> Result<Representatives> {
         let description = self.measurement.description();
-        let (views, lights, channels) =
-            (description.views.len(), description.lights.len(), description.channels);
+        let (views, texel) = (description.views.len(), description.texel_samples());
         let (bounds, offsets) = (self.tile.bounds(), self.tile.offsets_in_bounds());
-        let texel_bytes = lights * channels;
         let numbers: Vec<usize> = (0..views).collect();
         context.progress.begin("read representatives", views as u64, Counted::Items("views"));
-        let by_view = units::for_each(context, &numbers, context.threads, |&view| {
+        let of = |window: &Samples, range: Range<usize>| {
+            window.select(std::iter::once(range)).unwrap_or_else(|| Samples::none(description.sample_type))
+        };
+        let by_view: Vec<Vec<Samples>> = units::for_each(context, &numbers, context.threads, |&view| {
             let window = self.measurement.read_reflectance(view, bounds)?;
-            let of_texel = |&texel: &usize| {
-                let at = offsets[texel] * texel_bytes;
-                window[at..at + texel_bytes].to_vec()
-            };
             context.progress.advance(1);
-            Ok(texels.iter().map(of_texel).collect::<Vec<_>>())
+            Ok(texels.iter().map(|&t| offsets[t] * texel).map(|at| of(&window, at..at + texel)).collect())
         })?;
         context.progress.end();
-        let samples = (0..texels.len())
-            .flat_map(|cluster| by_view.iter().flat_map(move |view| view[cluster].iter().copied()))
-            .collect();
+        let mut samples = Samples::none(description.sample_type);
+        for cluster in 0..texels.len() {
+            for view in &by_view {
+                samples.append(&view[cluster]);
+            }
+        }
         Ok(Representatives {
-            shape: [texels.len(), views, lights, channels],
+            shape: [texels.len(), views, description.lights.len(), description.n_channels()],
+            channels: description.channels.clone(),
             samples,
             transfer: description.transfer,
         })

@@ -54,7 +54,7 @@ struct Sums {
     views: usize,
     codes: u64,
     code_count: u64,
-    squares: u64,
+    squares: f64,
     sample_count: u64,
     colour: f64,
     colour_count: u64,
@@ -74,12 +74,12 @@ impl Sums {
     }
 
     fn errors(self, view_theta_deg: Option<f64>) -> Errors {
-        let mean_square = self.squares as f64 / self.sample_count.max(1) as f64;
+        let mean_square = self.squares / self.sample_count.max(1) as f64;
         Errors {
             view_theta_deg,
             views: self.views,
             lightness: self.codes as f64 / self.code_count.max(1) as f64 / 2.55,
-            psnr_db: 10.0 * (255.0 * 255.0 / mean_square).log10(),
+            psnr_db: -10.0 * mean_square.log10(),
             ciede2000: self.colour / self.colour_count.max(1) as f64,
         }
     }
@@ -92,35 +92,40 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let description = measurement.description();
     let (tile, index, representatives) = (model.tile()?, model.index()?, model.representatives()?);
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
-    let (lights, channels) = (description.lights.len(), description.channels);
-    let texel_bytes = lights * channels;
-    let linear = description.transfer.table();
-    let codes = crate::color::LightnessCodes::new(description.transfer, channels, description.white);
+    let (texel, channels) = (description.texel_samples(), description.n_channels());
+    let decoder = description.decoder()?;
+    let codes = description.codes()?;
     let stride = offsets.len().div_ceil(COLOUR_TEXELS);
-    let colour =
-        |sample: &[u8]| lab(std::array::from_fn(|c| linear[usize::from(sample[c.min(channels - 1)])]));
 
     let views: Vec<usize> = (0..description.views.len()).collect();
     context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
-    let window_bytes = 2 * (bounds.size.texels() * texel_bytes) as u64;
+    let window_bytes = 2 * (bounds.size.texels() * description.texel_bytes()) as u64;
     let in_flight = units::in_flight(context, window_bytes);
     let sums = units::for_each(context, &views, in_flight, |&view| {
         let window = measurement.read_reflectance(view, bounds)?;
         let mut sums = Sums { views: 1, ..Sums::default() };
-        for (texel, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
-            let measured = &window[at * texel_bytes..(at + 1) * texel_bytes];
-            let start = (usize::from(cluster) * description.views.len() + view) * texel_bytes;
-            let modelled = &representatives.samples[start..start + texel_bytes];
-            for (a, b) in measured.chunks_exact(channels).zip(modelled.chunks_exact(channels)) {
-                sums.codes += u64::from(codes.code(a).0.abs_diff(codes.code(b).0));
-                sums.squares += a.iter().zip(b).map(|(&a, &b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>();
-                if texel % stride == 0 {
-                    sums.colour += ciede2000(colour(a), colour(b));
+        let difference = |measured: usize, modelled: usize| {
+            let [a, b] = [window.value(measured), representatives.samples.value(modelled)];
+            a.unwrap_or(0.0) - b.unwrap_or(0.0)
+        };
+        for (number, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
+            let start = (usize::from(cluster) * description.views.len() + view) * texel;
+            for sample in (0..texel).step_by(channels) {
+                let (measured, modelled) = (at * texel + sample, start + sample);
+                let code = codes.code(&window, measured);
+                sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
+                sums.squares += (0..channels).map(|c| difference(measured + c, modelled + c).powi(2)).sum::<f64>();
+                if number % stride == 0 {
+                    let [a, b] = [
+                        decoder.rgb(&window, measured),
+                        decoder.rgb(&representatives.samples, modelled),
+                    ];
+                    sums.colour += ciede2000(lab(a), lab(b));
                     sums.colour_count += 1;
                 }
             }
-            sums.code_count += lights as u64;
-            sums.sample_count += texel_bytes as u64;
+            sums.code_count += description.lights.len() as u64;
+            sums.sample_count += texel as u64;
         }
         context.progress.advance(1);
         Ok(sums)

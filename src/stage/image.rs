@@ -12,7 +12,7 @@ use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model};
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
@@ -111,8 +111,8 @@ pub fn of_measurement(
     let [views, lights] =
         [&description.views, &description.lights].map(|d| Interpolator::new(d, &triangulate(d)));
     let appearance = Appearance::new(&views, &lights, view, light);
-    let (lights, channels) = (description.lights.len(), description.channels);
-    let linear = description.transfer.table();
+    let (texel, channels) = (description.texel_samples(), description.n_channels());
+    let decoder = description.decoder()?;
     let mut pixels = vec![[0.0f64; 3]; window.size.texels()];
     let mut wanted: Vec<usize> = appearance.terms.iter().map(|&(view, ..)| view).collect();
     wanted.dedup();
@@ -123,9 +123,9 @@ pub fn of_measurement(
             let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
             let samples = measurement.read_reflectance(view, band)?;
             let to = &mut pixels[top * window.size.width..];
-            for (texel, sum) in samples.chunks_exact(lights * channels).zip(to) {
+            for (at, sum) in (0..samples.len()).step_by(texel).zip(to) {
                 for &(_, light, weight) in appearance.terms.iter().filter(|(v, ..)| *v == view) {
-                    add(sum, weight, &texel[light * channels..(light + 1) * channels], &linear);
+                    add(sum, weight, decoder.rgb(&samples, at + light * channels));
                 }
             }
         }
@@ -154,7 +154,8 @@ pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Resul
         (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
     let representatives = model.representatives()?;
     let appearance = Appearance::new(&views, &lights, view, light);
-    Ok(appearance.of_brdfs(&representatives.samples, representatives.shape, representatives.transfer))
+    let decoder = representatives.decoder()?;
+    Ok(appearance.of_brdfs(&representatives.samples, representatives.shape, &decoder))
 }
 
 /// Looks up the colour of each texel's cluster.

@@ -1,45 +1,74 @@
-//! Archive to measurement: decode the images of a view, transpose them texel by texel, write one shard.
+//! Archive to measurement: read the images of a view, arrange them texel by texel, write one shard.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use btfkit_formats::jpeg;
+use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::archive::Archive;
-use crate::color::{LightnessCodes, Transfer};
+use crate::archive::Source;
+use crate::color::{Remarkable, Transfer};
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
-use crate::run::recipe::{self, METHOD};
+use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Size;
-use crate::store::measurement::{Description, Measurement};
-use crate::texel::direction::Direction;
+use crate::store::chunk::Codec;
+use crate::store::gather::Images;
+use crate::store::measurement::{Description, Measurement, Origin};
+use btfkit_formats::Direction;
 
-/// Lights decoded before their samples are put in place: writes of 16 x 3 bytes a texel instead of 3.
-const LIGHTS_AT_ONCE: usize = 16;
+/// Views in flight: one is written while the next is decoded; the threads share the work of each.
+const VIEWS_IN_FLIGHT: usize = 2;
 
-/// Problems that an error names one by one.
-const NAMED_PROBLEMS: usize = 20;
-
-/// What to import and how.
+/// How an archive is turned into a measurement.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A zip or a folder.
-    pub archive: PathBuf,
     /// The measurement store to make.
     pub store: PathBuf,
-    /// Transfer curve of the samples.
-    pub transfer: Transfer,
     /// Reflectance that counts as L* = 100.
     pub white: f64,
+    /// How chunks are packed.
+    pub codec: Codec,
+    /// The part of the views that this run imports.
+    pub shard: Shard,
+}
+
+/// Part `part` of `parts` of the units of a stage: every `parts`-th.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// 0-based.
+    pub part: usize,
+    /// At least 1.
+    pub parts: usize,
+}
+
+impl Shard {
+    /// All units.
+    pub const WHOLE: Self = Self { part: 0, parts: 1 };
+
+    /// Whether a unit belongs to this part.
+    pub fn has(self, unit: usize) -> bool {
+        unit % self.parts == self.part
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let expected = || format!("expected K/N with K from 0 to N - 1, such as 0/4, got {text:?}");
+        let (part, parts) = text.split_once('/').ok_or_else(expected)?;
+        let number = |text: &str| text.trim().parse::<usize>().map_err(|_| expected());
+        let shard = Self { part: number(part)?, parts: number(parts)? };
+        if shard.part < shard.parts { Ok(shard) } else { Err(expected()) }
+    }
 }
 
 /// An import, ready to run.
-pub struct Plan {
-    archive: Archive,
-    store: PathBuf,
+pub struct Plan<'a> {
+    source: &'a dyn Source,
+    options: Options,
     description: Description,
     recipe: Value,
 }
@@ -47,97 +76,68 @@ pub struct Plan {
 /// How an import went.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Views in the store before this run.
+    /// Views of this run's part that were in the store before.
     pub views_found: usize,
     /// Views written by this run.
     pub views_written: usize,
-    /// Samples of this run's views brighter than white, stored with the code of L* = 100.
-    pub clipped: u64,
+    /// What was found in the samples of the views written.
+    pub samples: Remarkable,
 }
 
-/// Lists the archive, checks that all images have one size, and fixes the recipe.
-pub fn plan(options: &Options) -> Result<Plan> {
-    let archive = Archive::open(&options.archive)?;
-    let (header, checksums) = check_images(&archive)?;
-    let degrees = |angles: &[btfkit_formats::ubo2003::Angles]| -> Vec<[f64; 2]> {
-        angles.iter().map(|angles| [angles.theta_deg(), angles.phi_deg()]).collect()
+/// What a measurement of an archive will hold.
+pub fn describe(source: &dyn Source, white: f64) -> Description {
+    let contents = source.contents();
+    Description {
+        size: Size::new(contents.height as usize, contents.width as usize),
+        channels: contents.channels.clone(),
+        sample_type: contents.sample_type,
+        views: contents.views.clone(),
+        lights: contents.lights.clone(),
+        transfer: if contents.linear { Transfer::Linear } else { Transfer::Srgb },
+        white,
+    }
+}
+
+/// Looks at the whole archive without decoding it, and fixes the recipe.
+pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>) -> Result<Plan<'a>> {
+    let description = describe(source, options.white);
+    description.decoder()?;
+    let degrees = |list: &[Direction]| -> Vec<[f64; 2]> {
+        list.iter().map(|d| d.degrees()).map(|(theta, phi)| [theta, phi]).collect()
     };
-    let direction = |angles: &btfkit_formats::ubo2003::Angles| {
-        Direction::from_degrees(angles.theta_deg(), angles.phi_deg())
-    };
-    let description = Description {
-        size: Size::new(header.height as usize, header.width as usize),
-        channels: usize::from(header.channels),
-        views: archive.catalogue().views().iter().map(direction).collect(),
-        lights: archive.catalogue().lights().iter().map(direction).collect(),
-        transfer: options.transfer,
-        white: options.white,
-    };
+    let contents = source.contents();
     let recipe = json!({
         "stage": "import",
         "method": METHOD,
-        "layout": "ubo2003",
-        "size": [header.height, header.width, u32::from(header.channels)],
-        "views": degrees(archive.catalogue().views()),
-        "lights": degrees(archive.catalogue().lights()),
-        "images": recipe::digest_bytes(&checksums),
-        "transfer": options.transfer,
+        "format": contents.format,
+        "size": [description.size.height, description.size.width],
+        "channels": description.channels,
+        "samples": description.sample_type.name(),
+        "views": degrees(&description.views),
+        "lights": degrees(&description.lights),
+        "images": source.check(context)?,
+        "transfer": description.transfer,
         "white": options.white,
+        "codec": options.codec,
+        "assumptions": contents.assumptions,
     });
-    Ok(Plan { archive, store: options.store.clone(), description, recipe })
+    Ok(Plan { source, options, description, recipe })
 }
 
-/// Checks the structure of every image (not its pixels) and that all have one size; returns the first header and
-/// the checksums of all, in the order of the directions.
-fn check_images(archive: &Archive) -> Result<(jpeg::Header, Vec<u8>)> {
-    let (views, lights) = (archive.catalogue().views().len(), archive.catalogue().lights().len());
-    let mut first = None;
-    let mut checksums = Vec::with_capacity(4 * views * lights);
-    let mut problems = Vec::new();
-    for (view, light) in (0..views).flat_map(|view| (0..lights).map(move |light| (view, light))) {
-        let header = archive.image_bytes(view, light).and_then(|bytes| {
-            checksums.extend(archive.checksum(view, light, &bytes).to_le_bytes());
-            jpeg::check(&bytes, archive.limits())
-                .map_err(|error| error.in_entry(archive.image_name(view, light)).into())
-        });
-        archive.release(view, light);
-        match (header, &first) {
-            (Err(error), _) => problems.push(error.to_string()),
-            (Ok(header), None) => first = Some(header),
-            (Ok(found), Some(expected)) => {
-                let shape = |h: &jpeg::Header| (h.width, h.height, h.channels);
-                if shape(&found) != shape(expected) {
-                    problems.push(format!(
-                        "{}: got {}x{} with {} channels, expected {}x{} with {} like the first image",
-                        archive.image_name(view, light),
-                        found.width,
-                        found.height,
-                        found.channels,
-                        expected.width,
-                        expected.height,
-                        expected.channels
-                    ));
-                }
-            }
-        }
-    }
-    fail_on(archive.path(), &problems, "replace these images and run the same command again")?;
-    let first = first.ok_or_else(|| Error::input(format!("{}: no images", archive.path().display())))?;
-    Ok((first, checksums))
-}
-
-impl Plan {
+impl Plan<'_> {
     /// What would be done, for people and schedulers.
     pub fn summary(&self) -> Value {
         json!({
             "stage": "import",
-            "store": self.store,
+            "store": self.options.store,
             "size": self.description.size.to_string(),
             "views": self.description.views.len(),
             "lights": self.description.lights.len(),
             "channels": self.description.channels,
+            "samples": self.description.sample_type.name(),
             "raw_bytes": self.description.bytes(),
             "unit": "view",
+            "units": self.views().count(),
             "unit_memory_bytes": self.unit_bytes(),
             "recipe": self.recipe,
         })
@@ -148,107 +148,93 @@ impl Plan {
         &self.description
     }
 
-    /// Memory of one view in flight: samples, codes, a group of images, a shard and its encoding.
+    /// Images that a run of this plan goes through.
+    pub fn images(&self) -> u64 {
+        (self.views().count() * self.description.lights.len()) as u64
+    }
+
+    fn views(&self) -> impl Iterator<Item = usize> {
+        (0..self.description.views.len()).filter(|&view| self.options.shard.has(view))
+    }
+
+    /// Memory of one view in flight: its images, and both shards twice, as chunks and put together.
     fn unit_bytes(&self) -> u64 {
         let view = self.description.view_bytes();
-        let images = (self.description.size.texels() * self.description.channels * LIGHTS_AT_ONCE) as u64;
-        2 * view + 2 * view / self.description.channels as u64 + images + self.description.shard_bytes()
+        let codes = (self.description.size.texels() * self.description.lights.len()) as u64;
+        3 * view + 2 * codes
     }
 
     /// Imports the views that are not in the store yet.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let measurement = Measurement::create(&self.store, self.description.clone(), &self.recipe)?;
-        let views: Vec<usize> =
-            (0..self.description.views.len()).filter(|&view| !measurement.has_view(view)).collect();
-        let lights = self.description.lights.len() as u64;
-        context.progress.begin("import", views.len() as u64 * lights, Counted::Items("images"));
-        let codes =
-            LightnessCodes::new(self.description.transfer, self.description.channels, self.description.white);
-        let clipped = AtomicU64::new(0);
-        let in_flight = units::in_flight(context, self.unit_bytes());
-        let problems = units::for_each(context, &views, in_flight, |&view| {
-            let (samples, problems) = self.decode_view(view, context)?;
-            if problems.is_empty() {
-                let (luminance, over) = self.luminance(&samples, &codes);
-                clipped.fetch_add(over, Ordering::Relaxed);
-                measurement.write_view(view, samples, luminance)?;
-            }
-            Ok(problems)
+        let contents = self.source.contents();
+        let origin = Origin {
+            recipe: &self.recipe,
+            assumptions: &contents.assumptions,
+            remarks: &contents.remarks,
+        };
+        let store = &self.options.store;
+        let measurement = Measurement::create(store, self.description.clone(), self.options.codec, &origin)?;
+        let (found, missing): (Vec<usize>, Vec<usize>) = self.views().partition(|&view| measurement.has_view(view));
+        context.progress.begin("import", self.images(), Counted::Items("images"));
+        context.progress.advance((found.len() * self.description.lights.len()) as u64);
+        let codes = self.description.codes()?;
+        let in_flight = units::in_flight(context, self.unit_bytes()).min(VIEWS_IN_FLIGHT);
+        let results = units::for_each(context, &missing, in_flight, |&view| {
+            Ok(match self.read_view(view, context)? {
+                Ok(images) => {
+                    (context.install(|| measurement.write_view(view, &images, &codes))?, Vec::new())
+                }
+                Err(problems) => (Remarkable::default(), problems),
+            })
         })?;
         context.progress.end();
-        let hint = "replace these images, delete the unfinished store and import again";
-        fail_on(self.archive.path(), &problems.concat(), hint)?;
-        Ok(Report {
-            views_found: self.description.views.len() - views.len(),
-            views_written: views.len(),
-            clipped: clipped.into_inner(),
-        })
+        let mut samples = Remarkable::default();
+        let mut problems = Vec::new();
+        for (found, more) in results {
+            samples += found;
+            problems.extend(more);
+        }
+        if !problems.is_empty() {
+            return Err(Error::input(problems.join("\n"))
+                .hint("replace these images, delete the unfinished store and import again"));
+        }
+        Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
 
-    /// Samples of a view [y, x, light, channel], and what is wrong with its images.
-    fn decode_view(&self, view: usize, context: &Context<'_>) -> Result<(Vec<u8>, Vec<String>)> {
-        let (lights, channels) = (self.description.lights.len(), self.description.channels);
-        let texel_bytes = lights * channels;
-        let mut samples = vec![0; self.description.size.texels() * texel_bytes];
-        let mut problems = Vec::new();
-        for first in (0..lights).step_by(LIGHTS_AT_ONCE) {
-            context.check_stop()?;
-            let last = (first + LIGHTS_AT_ONCE).min(lights);
-            let mut images = Vec::with_capacity(LIGHTS_AT_ONCE);
-            for light in first..last {
-                let name = self.archive.image_name(view, light);
-                let image = self.archive.image_bytes(view, light).and_then(|bytes| {
-                    jpeg::decode(&bytes, self.archive.limits()).map_err(|error| error.in_entry(name).into())
-                });
-                self.archive.release(view, light);
-                match image {
-                    Ok(image) => images.push(image.samples),
-                    Err(error) => problems.push(error.to_string()),
-                }
-                context.progress.advance(1);
-            }
-            if images.len() == last - first {
-                let group = first * channels..last * channels;
-                for (texel, to) in samples.chunks_exact_mut(texel_bytes).enumerate() {
-                    for (to, image) in to[group.clone()].chunks_exact_mut(channels).zip(&images) {
-                        to.copy_from_slice(&image[texel * channels..(texel + 1) * channels]);
-                    }
-                }
+    /// The images of a view, or what is wrong with them.
+    fn read_view(&self, view: usize, context: &Context<'_>) -> Result<std::result::Result<Images, Vec<String>>> {
+        let lights = self.description.lights.len();
+        let step = self.source.lights_at_once().clamp(1, lights);
+        let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
+        let read: Vec<_> = context.install(|| {
+            groups
+                .into_par_iter()
+                .map(|group| {
+                    context.check_stop()?;
+                    let samples = self.source.read_images(view, group.clone());
+                    context.progress.advance(group.len() as u64);
+                    samples.map(|samples| (group, samples))
+                })
+                .collect()
+        });
+        context.check_stop()?;
+        let (mut images, mut problems) = (Vec::new(), Vec::new());
+        for group in read {
+            match group {
+                Ok(group) => images.push(group),
+                Err(error) if error.kind() == crate::Kind::Input => problems.push(error.to_string()),
+                Err(error) => return Err(error),
             }
         }
-        Ok((samples, problems))
-    }
-
-    /// L* codes [y, x, light] of a view's samples, and how many samples are brighter than white.
-    fn luminance(&self, samples: &[u8], codes: &LightnessCodes) -> (Vec<u8>, u64) {
-        let mut clipped = 0;
-        let luminance = samples
-            .chunks_exact(self.description.channels)
-            .map(|sample| {
-                let (code, over) = codes.code(sample);
-                clipped += u64::from(over);
-                code
-            })
-            .collect();
-        (luminance, clipped)
+        if !problems.is_empty() {
+            return Ok(Err(problems));
+        }
+        let Description { size, sample_type, .. } = self.description;
+        Ok(Ok(Images::new(size, self.description.n_channels(), sample_type, images)?))
     }
 }
 
-/// One error that names all problems.
-fn fail_on(archive: &Path, problems: &[String], hint: &str) -> Result<()> {
-    if problems.is_empty() {
-        return Ok(());
-    }
-    let mut lines: Vec<&str> = problems.iter().take(NAMED_PROBLEMS).map(String::as_str).collect();
-    let more = format!("and {} more", problems.len().saturating_sub(NAMED_PROBLEMS));
-    if problems.len() > NAMED_PROBLEMS {
-        lines.push(&more);
-    }
-    Err(Error::input(format!(
-        "{}: {} unusable images\n  {}",
-        archive.display(),
-        problems.len(),
-        lines.join("\n  ")
-    ))
-    .hint(hint))
+/// The store that an archive goes to where none is named: its name with `.zarr`, in a folder.
+pub fn default_store(archive: &Path, folder: &Path) -> PathBuf {
+    folder.join(format!("{}.zarr", archive.file_stem().unwrap_or_default().to_string_lossy()))
 }

@@ -9,3 +9,4 @@ pub mod import;
 pub mod normals;
 pub mod sample;
 pub mod tile;
+pub mod verify;

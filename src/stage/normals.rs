@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use btfkit_formats::Samples;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::color::luminance;
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
@@ -94,16 +94,12 @@ impl Plan {
         context: &Context<'_>,
     ) -> Result<Vec<[f32; 3]>> {
         let description = self.measurement.description();
-        let (lights, channels) = (description.lights.len(), description.channels);
-        let linear = description.transfer.table();
-        let normal = |texel: &[u8]| {
-            let intensities: Vec<f64> = texel
-                .chunks_exact(channels)
-                .map(|sample| {
-                    let mut values = [0.0; 3];
-                    values.iter_mut().zip(sample).for_each(|(value, &s)| *value = linear[usize::from(s)]);
-                    luminance(&values[..channels])
-                })
+        let (texel, channels) = (description.texel_samples(), description.n_channels());
+        let decoder = description.decoder()?;
+        let normal = |samples: &Samples, at: usize| {
+            let intensities: Vec<f64> = (at..at + texel)
+                .step_by(channels)
+                .map(|sample| decoder.luminance(samples, sample))
                 .collect();
             if self.robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
         };
@@ -114,8 +110,9 @@ impl Plan {
             let rows = BAND_ROWS.min(window.size.height - top);
             let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
             let samples = self.measurement.read_reflectance(view, band)?;
+            let texels = 0..samples.len() / texel;
             let band: Vec<[f32; 3]> =
-                context.install(|| samples.par_chunks_exact(lights * channels).map(normal).collect());
+                context.install(|| texels.into_par_iter().map(|t| normal(&samples, t * texel)).collect());
             normals.extend(band);
             context.progress.advance(rows as u64);
         }

@@ -129,7 +129,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::texel::direction::Direction;
+    use btfkit_formats::Direction;
     use crate::texel::stereo::Stereo;
 
     #[test]

@@ -2,16 +2,20 @@
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
+pub mod chunk;
 pub mod enlarged;
 pub mod field;
+pub mod gather;
 mod lock;
 pub mod mapped;
 pub mod measurement;
 pub mod model;
+mod shard;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use btfkit_formats::{SampleType, Samples, f16};
 use serde_json::{Map, Value, json};
 use zarrs::array::codec::{ShardingCodecOptions, SubchunkWriteOrder, ZstdCodec};
 use zarrs::array::{
@@ -80,7 +84,37 @@ macro_rules! named {
         }
     )*};
 }
-named!(u8 => uint8, u16 => uint16, u32 => uint32, i32 => int32, f32 => float32, f64 => float64);
+named!(u8 => uint8, u16 => uint16, u32 => uint32, i32 => int32, f16 => float16, f32 => float32, f64 => float64);
+
+/// The Zarr data type of samples.
+fn data_type_of(sample_type: SampleType) -> DataType {
+    match sample_type {
+        SampleType::U8 => u8::data_type(),
+        SampleType::U16 => u16::data_type(),
+        SampleType::F16 => f16::data_type(),
+        SampleType::F32 => f32::data_type(),
+    }
+}
+
+/// The type of an array's elements, if it is one that samples come in.
+fn sample_type_of(array: &Array) -> Option<SampleType> {
+    [SampleType::U8, SampleType::U16, SampleType::F16, SampleType::F32]
+        .into_iter()
+        .find(|&sample_type| data_type_of(sample_type) == *array.data_type())
+}
+
+/// The names of the channels of an array whose last dimension is the channel.
+fn channel_names(array: &Array) -> std::result::Result<Vec<String>, String> {
+    let names = array.attributes().get("channels").cloned().unwrap_or_default();
+    let names: Vec<String> =
+        serde_json::from_value(names).map_err(|error| format!("attribute channels: {error}"))?;
+    let extent = array.shape().last().copied();
+    if extent == Some(names.len() as u64) {
+        Ok(names)
+    } else {
+        Err(format!("got shape {:?} and channels named {names:?}", array.shape()))
+    }
+}
 
 /// A Zarr v3 group in a directory.
 #[derive(Clone)]
@@ -279,6 +313,39 @@ impl Store {
         Ok(())
     }
 
+    /// Writes a whole array of samples whose last dimension is the channel.
+    pub(crate) fn write_samples(
+        &self,
+        name: &str,
+        names: &[&str],
+        shape: &[usize],
+        channels: &[String],
+        samples: &Samples,
+    ) -> Result<()> {
+        let write = |mut layout: Layout<'_>, write: &dyn Fn(&Layout<'_>) -> Result<()>| {
+            layout.attributes.insert("channels".to_owned(), json!(channels));
+            write(&layout)
+        };
+        match samples {
+            Samples::U8(list) => write(Layout::small::<u8>(names, shape), &|l| self.write(name, l, list)),
+            Samples::U16(list) => write(Layout::small::<u16>(names, shape), &|l| self.write(name, l, list)),
+            Samples::F16(list) => write(Layout::small::<f16>(names, shape), &|l| self.write(name, l, list)),
+            Samples::F32(list) => write(Layout::small::<f32>(names, shape), &|l| self.write(name, l, list)),
+        }
+    }
+
+    /// Reads a whole array of samples: its shape, the names of its channels, and the samples.
+    pub(crate) fn read_all_samples(&self, name: &str) -> Result<(Vec<usize>, Vec<String>, Samples)> {
+        let array = self.open_array(name)?;
+        let sample_type = sample_type_of(&array).ok_or_else(|| {
+            self.damaged(name, &format!("got elements of type {}, expected samples", array.data_type()))
+        })?;
+        let shape: Vec<usize> = array.shape().iter().map(|&n| n as usize).collect();
+        let channels = channel_names(&array).map_err(|error| self.damaged(name, &error))?;
+        let samples = self.read_samples(&array, sample_type, &vec![0; shape.len()], array.shape())?;
+        Ok((shape, channels, samples))
+    }
+
     /// Encodes and writes one chunk (or shard) of an array, all-zero ones too.
     pub fn write_chunk<T: Named>(&self, array: &Array, indices: &[u64], elements: Vec<T>) -> Result<()> {
         // One thread: a shard's bytes must not depend on which of its chunks was encoded first.
@@ -286,9 +353,35 @@ impl Store {
         array.store_chunk_opt(indices, elements, &options).map_err(|error| write_error(&error))
     }
 
+    /// Writes a shard that is encoded already.
+    pub(crate) fn write_encoded(&self, array: &Array, indices: &[u64], bytes: Vec<u8>) -> Result<()> {
+        mapped::write_file(&self.chunk_path(array, indices), &bytes)
+    }
+
+    /// The file of a chunk (or shard).
+    pub fn chunk_path(&self, array: &Array, indices: &[u64]) -> PathBuf {
+        self.storage.path(&array.chunk_key(indices))
+    }
+
+    /// Reads a box of samples; see [`Store::read_box`].
+    pub(crate) fn read_samples(
+        &self,
+        array: &Array,
+        sample_type: SampleType,
+        start: &[u64],
+        extent: &[u64],
+    ) -> Result<Samples> {
+        Ok(match sample_type {
+            SampleType::U8 => Samples::U8(self.read_box(array, start, extent)?),
+            SampleType::U16 => Samples::U16(self.read_box(array, start, extent)?),
+            SampleType::F16 => Samples::F16(self.read_box(array, start, extent)?),
+            SampleType::F32 => Samples::F32(self.read_box(array, start, extent)?),
+        })
+    }
+
     /// Whether a chunk (or shard) has been written.
     pub fn has_chunk(&self, array: &Array, indices: &[u64]) -> bool {
-        self.storage.path(&array.chunk_key(indices)).is_file()
+        self.chunk_path(array, indices).is_file()
     }
 
     /// Reads a box of an array: offset and extent in each dimension.

@@ -5,9 +5,10 @@
 
 use std::path::Path;
 
+use btfkit_formats::Samples;
 use serde_json::{Map, Value, json};
 
-use crate::color::Transfer;
+use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
 use crate::mrf::Model as FieldModel;
 use crate::run::recipe;
@@ -15,7 +16,7 @@ use crate::shape::Size;
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
 use crate::store::{Layout, Lock, Named, Store};
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
 
@@ -248,8 +249,9 @@ impl Model {
         texels: &[[u32; 2]],
     ) -> Result<()> {
         let names = ["cluster", "view", "light", "channel"];
-        let layout = Layout::small::<u8>(&names, &representatives.shape);
-        self.store.write("representatives", &layout, &representatives.samples)?;
+        let shape = &representatives.shape;
+        let channels = &representatives.channels;
+        self.store.write_samples("representatives", &names, shape, channels, &representatives.samples)?;
         let layout = Layout::small::<u32>(&["cluster", "row_column"], &[texels.len(), 2]);
         self.store.write(
             "representative_texel",
@@ -260,20 +262,18 @@ impl Model {
 
     /// The measured colour BRDFs that stand for the clusters.
     pub fn representatives(&self) -> Result<Representatives> {
-        let (shape, samples) = self.store.read::<u8>("representatives", &[0, 0, 0, 0])?;
+        let (shape, channels, samples) = self.store.read_all_samples("representatives")?;
         let [views, lights] = self.directions()?;
-        if shape[..3] != [self.clusters()?, views.len(), lights.len()]
-            || !matches!(shape[3], 1 | 3)
-            || samples.is_empty()
-        {
-            return Err(self
-                .damaged("representatives", &format!("got shape {shape:?}, which does not fit the model")));
+        let expected = [self.clusters()?, views.len(), lights.len(), channels.len()];
+        if shape != expected || samples.is_empty() {
+            let found = format!("got shape {shape:?}, expected {expected:?} to fit the model");
+            return Err(self.damaged("representatives", &found));
         }
         let report: Map<String, Value> = self.report(Stage::Tile)?;
         let transfer = report.get("transfer").cloned().unwrap_or_default();
         let transfer: Transfer = serde_json::from_value(transfer)
             .map_err(|error| Error::input(format!("{}: transfer: {error}", self.path().display())))?;
-        Ok(Representatives { shape: [shape[0], shape[1], shape[2], shape[3]], samples, transfer })
+        Ok(Representatives { shape: expected, channels, samples, transfer })
     }
 
     /// Writes D of (26), [cluster, cluster], L* units.
@@ -327,10 +327,22 @@ impl Model {
 pub struct Representatives {
     /// Clusters, views, lights, channels.
     pub shape: [usize; 4],
-    /// Samples in that order.
-    pub samples: Vec<u8>,
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Samples in the order of the shape.
+    pub samples: Samples,
     /// Their transfer curve.
     pub transfer: Transfer,
+}
+
+impl Representatives {
+    /// What turns them into linear RGB.
+    ///
+    /// # Errors
+    /// Channels that are not understood.
+    pub fn decoder(&self) -> Result<Decoder> {
+        Decoder::new(self.transfer, self.samples.sample_type(), &self.channels)
+    }
 }
 
 /// Writes an index [y, x] as u8 or u16 by the number of clusters.

@@ -1,7 +1,9 @@
 //! Values under any light and view, equation (27), mixed between measured directions in linear light.
 
-use crate::color::Transfer;
-use crate::texel::direction::Direction;
+use btfkit_formats::Samples;
+
+use crate::color::Decoder;
+use btfkit_formats::Direction;
 use crate::texel::triangulation::Interpolator;
 
 /// Which measured direction pairs stand for another pair, and with what weights.
@@ -24,16 +26,14 @@ impl Appearance {
     }
 
     /// Linear RGB of BRDFs laid out [brdf, view, light, channel].
-    pub fn of_brdfs(&self, brdfs: &[u8], shape: [usize; 4], transfer: Transfer) -> Vec<[f32; 3]> {
-        let [_, views, lights, channels] = shape;
-        let linear = transfer.table();
-        brdfs
-            .chunks_exact(views * lights * channels)
+    pub fn of_brdfs(&self, brdfs: &Samples, shape: [usize; 4], decoder: &Decoder) -> Vec<[f32; 3]> {
+        let [count, views, lights, channels] = shape;
+        (0..count)
             .map(|brdf| {
                 let mut sum = [0.0; 3];
                 for &(view, light, weight) in &self.terms {
-                    let at = (view * lights + light) * channels;
-                    add(&mut sum, weight, &brdf[at..at + channels], &linear);
+                    let at = ((brdf * views + view) * lights + light) * channels;
+                    add(&mut sum, weight, decoder.rgb(brdfs, at));
                 }
                 sum.map(|value| value as f32)
             })
@@ -41,10 +41,8 @@ impl Appearance {
     }
 }
 
-/// Adds the linear values of a texel's samples, times `weight`; a single channel counts as grey.
+/// Adds a colour times `weight`.
 #[inline]
-pub fn add(sum: &mut [f64; 3], weight: f64, samples: &[u8], linear: &[f64; 256]) {
-    for (channel, sum) in sum.iter_mut().enumerate() {
-        *sum += weight * linear[usize::from(samples[channel.min(samples.len() - 1)])];
-    }
+pub fn add(sum: &mut [f64; 3], weight: f64, rgb: [f64; 3]) {
+    sum.iter_mut().zip(rgb).for_each(|(sum, value)| *sum += weight * value);
 }

@@ -2,7 +2,6 @@
 
 pub mod cluster;
 pub mod companion;
-pub mod direction;
 pub mod evaluate;
 pub mod nearest;
 pub mod scan;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::{Error, Result};
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 
 /// Share of the lights that a robust fit leaves out, darkest and brightest against the fit together.
 const ROBUST_SHARE: f64 = 0.3;

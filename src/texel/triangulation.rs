@@ -2,7 +2,7 @@
 
 use delaunator::{Point, triangulate as planar_delaunay};
 
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 
 /// Two directions closer than this (chord length) are the same.
 const SAME_DIRECTION: f64 = 1e-7;

@@ -4,7 +4,7 @@ use btfkit::random::Hash;
 use btfkit::sample::{Kind, Scene, Surface};
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::model::Model;
-use btfkit::texel::direction::Direction;
+use btfkit_formats::Direction;
 use btfkit::texel::stereo::Stereo;
 
 use crate::fixture::fixture;

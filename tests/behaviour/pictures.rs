@@ -12,7 +12,7 @@ use crate::fixture::{btf, fixture, succeed};
 /// The 8-bit pixels of `btf image` at view 4 and light 11 of the fixture.
 fn pixels(source: &Path, view: usize, light: usize) -> Vec<u8> {
     let measurement = Measurement::open(&fixture().measurement()).unwrap();
-    let angles = |direction: btfkit::texel::direction::Direction| {
+    let angles = |direction: btfkit_formats::Direction| {
         let (theta, phi) = direction.degrees();
         format!("{theta},{phi}")
     };

@@ -188,7 +188,7 @@ mod tests {
     use crate::run::progress::Silent;
     use crate::texel::cluster::points::Arrangement;
     use crate::texel::cluster::seeding;
-    use crate::texel::direction::Direction;
+    use btfkit_formats::Direction;
     use std::sync::atomic::AtomicBool;
 
     /// Texels that scatter by up to 3 codes around `kinds` BRDFs.

@@ -1,7 +1,7 @@
 //! BRDFs as vectors of L* codes, arranged so that directions of equal weight lie together.
 
 use crate::kernel::absolute_difference::{Group, LANE_BYTES};
-use crate::texel::direction::Direction;
+use btfkit_formats::Direction;
 
 /// Fixed-point one of the weights cos(theta_v).
 pub const WEIGHT_ONE: f64 = 65536.0;

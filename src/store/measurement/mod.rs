@@ -2,74 +2,35 @@
 //!
 //! | array | shape | type |
 //! | --- | --- | --- |
-//! | `reflectance` | [view, y, x, light, channel] | u8, as measured |
+//! | `reflectance` | [view, y, x, light, channel] | u8, u16, f16 or f32, as measured |
 //! | `luminance` | [view, y, x, light] | u8, L* code `round(2.55 L*)` |
 //! | `view_direction`, `light_direction` | [n, 2] | f64, theta and phi in radians |
 //!
 //! One shard is one view (of a part of the plane), so a view is the unit of an import.
 
-use std::path::Path;
+mod description;
+mod write;
 
+use std::path::{Path, PathBuf};
+
+use btfkit_formats::{SampleType, Samples};
 use serde_json::{Map, Value, json};
 
-use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::shape::{Size, Window};
-use crate::store::{Array, Layout, Store};
-use crate::texel::direction::Direction;
+use crate::store::chunk::Codec;
+use crate::store::{Array, Layout, Named, Store};
+use btfkit_formats::Direction;
+use crate::views::Views;
+pub use description::Description;
+use description::SHARD_LIMIT_BYTES;
 
 /// The attribute `kind` of a measurement store.
 pub const KIND: &str = "measurement";
 
 /// Side of a chunk in texels.
 const CHUNK_SIDE: usize = 16;
-
-/// Most bytes of samples in one shard.
-const SHARD_LIMIT_BYTES: usize = 256 << 20;
-
-/// What a measurement holds: sizes, directions, and how samples are meant.
-#[derive(Clone, Debug)]
-pub struct Description {
-    /// Rows and columns of the rectified images.
-    pub size: Size,
-    /// Samples of a texel under one pair of directions: 1 or 3 (R, G, B).
-    pub channels: usize,
-    /// View directions, in the order of the arrays.
-    pub views: Vec<Direction>,
-    /// Light directions, the same for all views.
-    pub lights: Vec<Direction>,
-    /// Transfer curve of the samples.
-    pub transfer: Transfer,
-    /// Reflectance that counts as L* = 100.
-    pub white: f64,
-}
-
-impl Description {
-    /// Bytes of one view's samples.
-    pub fn view_bytes(&self) -> u64 {
-        (self.size.texels() * self.lights.len() * self.channels) as u64
-    }
-
-    /// Bytes of all samples.
-    pub fn bytes(&self) -> u64 {
-        self.view_bytes() * self.views.len() as u64
-    }
-
-    /// Bytes of one shard's samples.
-    pub fn shard_bytes(&self) -> u64 {
-        let side = self.shard_side(SHARD_LIMIT_BYTES);
-        (side * side * self.lights.len() * self.channels) as u64
-    }
-
-    /// Side of a shard: the whole plane, or as much as keeps a shard within `limit_bytes`.
-    fn shard_side(&self, limit_bytes: usize) -> usize {
-        let texel_bytes = self.lights.len() * self.channels;
-        let affordable = (limit_bytes / texel_bytes.max(1)).isqrt() / CHUNK_SIDE * CHUNK_SIDE;
-        let plane = self.size.height.max(self.size.width).next_multiple_of(CHUNK_SIDE);
-        plane.min(affordable.max(CHUNK_SIDE))
-    }
-}
 
 /// A measurement store, open for reading or writing.
 pub struct Measurement {
@@ -78,6 +39,7 @@ pub struct Measurement {
     digest: String,
     /// Side of a shard in texels.
     side: usize,
+    codec: Codec,
     reflectance: Array,
     luminance: Array,
 }
@@ -87,16 +49,18 @@ impl Measurement {
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
-    pub fn create(path: &Path, description: Description, recipe: &Value) -> Result<Self> {
-        Self::create_in_shards(path, description, recipe, SHARD_LIMIT_BYTES)
+    pub fn create(path: &Path, description: Description, codec: Codec, origin: &Origin<'_>) -> Result<Self> {
+        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES)
     }
 
     fn create_in_shards(
         path: &Path,
         description: Description,
-        recipe: &Value,
+        codec: Codec,
+        origin: &Origin<'_>,
         limit_bytes: usize,
     ) -> Result<Self> {
+        let recipe = origin.recipe;
         let store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
         store.begin_by_recipe(
@@ -104,6 +68,7 @@ impl Measurement {
             recipe,
             json!({
                 "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
+                "assumptions": origin.assumptions, "remarks": origin.remarks,
             }),
         )?;
         write_directions(&store, "view_direction", "view", &description.views)?;
@@ -111,7 +76,7 @@ impl Measurement {
         let side = description.shard_side(limit_bytes);
         let reflectance = create_reflectance(&store, &description, side)?;
         let luminance = create_luminance(&store, &description, side)?;
-        Ok(Self { store, description, digest: recipe::digest(recipe), side, reflectance, luminance })
+        Ok(Self { store, description, digest: recipe::digest(recipe), side, codec, reflectance, luminance })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
@@ -123,7 +88,7 @@ impl Measurement {
         let views = read_directions(&store, "view_direction")?;
         let lights = read_directions(&store, "light_direction")?;
         let damaged = |what: String| Error::input(format!("{}: {what}", path.display()));
-        let &[n_views, height, width, n_lights, channels] = reflectance.shape() else {
+        let &[n_views, height, width, n_lights, _] = reflectance.shape() else {
             return Err(damaged(format!(
                 "reflectance: got shape {:?}, expected 5 dimensions",
                 reflectance.shape()
@@ -132,7 +97,6 @@ impl Measurement {
         let expected = [n_views, height, width, n_lights];
         let consistent = (n_views, n_lights) == (views.len() as u64, lights.len() as u64)
             && luminance.shape() == expected
-            && matches!(channels, 1 | 3)
             && reflectance
                 .shape()
                 .iter()
@@ -155,9 +119,14 @@ impl Measurement {
         let white =
             white.ok_or_else(|| damaged("attribute btfkit.white: expected a reflectance".to_owned()))?;
         let digest = found.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
+        let names = crate::store::channel_names(&reflectance)
+            .map_err(|error| damaged(format!("reflectance: {error}")))?;
+        let sample_type = crate::store::sample_type_of(&reflectance)
+            .ok_or_else(|| damaged(format!("reflectance: got samples of {}", reflectance.data_type())))?;
         let description = Description {
             size: Size::new(height as usize, width as usize),
-            channels: channels as usize,
+            channels: names,
+            sample_type,
             views,
             lights,
             transfer,
@@ -168,7 +137,7 @@ impl Measurement {
             .ok()
             .and_then(|shape| shape.get(1).map(|side| side.get() as usize))
             .ok_or_else(|| damaged("reflectance: no shard shape".to_owned()))?;
-        Ok(Self { store, description, digest, side, reflectance, luminance })
+        Ok(Self { store, description, digest, side, codec: Codec::Stock, reflectance, luminance })
     }
 
     /// What it holds.
@@ -199,37 +168,44 @@ impl Measurement {
         (0..self.description.views.len()).filter(|&view| self.has_view(view)).count()
     }
 
-    /// Writes one view: samples [y, x, light, channel] and L* codes [y, x, light].
-    pub fn write_view(&self, view: usize, reflectance: Vec<u8>, luminance: Vec<u8>) -> Result<()> {
-        let Description { lights, channels, .. } = &self.description;
-        self.write_shards(&self.reflectance, view, reflectance, lights.len() * channels)?;
-        self.write_shards(&self.luminance, view, luminance, lights.len())
+    fn chunk_shape(&self) -> Vec<u64> {
+        let mut shape = self.code_chunk_shape();
+        shape.push(self.description.n_channels() as u64);
+        shape
     }
 
-    fn write_shards(&self, array: &Array, view: usize, samples: Vec<u8>, texel_bytes: usize) -> Result<()> {
-        let Size { height, width } = self.description.size;
-        let side = self.side;
-        let index = |sy: u64, sx: u64| {
-            let mut index = vec![0; array.dimensionality()];
-            (index[0], index[1], index[2]) = (view as u64, sy, sx);
-            index
-        };
-        if (height, width) == (side, side) {
-            return self.store.write_chunk(array, &index(0, 0), samples);
+    fn code_chunk_shape(&self) -> Vec<u64> {
+        vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, self.description.lights.len() as u64]
+    }
+
+    /// The texels of each chunk, cut at the border of the plane.
+    pub fn chunk_windows(&self) -> impl Iterator<Item = Window> + use<> {
+        self.windows(CHUNK_SIDE)
+    }
+
+    /// The texels of each row of chunks.
+    pub fn chunk_row_windows(&self) -> impl Iterator<Item = Window> + use<> {
+        self.windows(self.description.size.width)
+    }
+
+    fn windows(&self, width: usize) -> impl Iterator<Item = Window> + use<> {
+        let plane = self.description.size;
+        (0..plane.height).step_by(CHUNK_SIDE).flat_map(move |y| {
+            (0..plane.width).step_by(width).map(move |x| Window {
+                y,
+                x,
+                size: Size::new(CHUNK_SIDE.min(plane.height - y), width.min(plane.width - x)),
+            })
+        })
+    }
+
+    /// The file of the shard that a window begins in.
+    pub fn shard_path(&self, array: SampleArray, view: usize, window: Window) -> PathBuf {
+        let place = [view, window.y / self.side, window.x / self.side, 0, 0].map(|n| n as u64);
+        match array {
+            SampleArray::Reflectance => self.store.chunk_path(&self.reflectance, &place),
+            SampleArray::Luminance => self.store.chunk_path(&self.luminance, &place[..4]),
         }
-        for (sy, sx) in self.shards() {
-            let (y0, x0) = (sy as usize * side, sx as usize * side);
-            let columns = side.min(width - x0);
-            let mut shard = vec![0; side * side * texel_bytes];
-            for y in y0..height.min(y0 + side) {
-                let from = (y * width + x0) * texel_bytes;
-                let to = (y - y0) * side * texel_bytes;
-                shard[to..to + columns * texel_bytes]
-                    .copy_from_slice(&samples[from..from + columns * texel_bytes]);
-            }
-            self.store.write_chunk(array, &index(sy, sx), shard)?;
-        }
-        Ok(())
     }
 
     fn shards(&self) -> impl Iterator<Item = (u64, u64)> + use<> {
@@ -240,14 +216,12 @@ impl Measurement {
     }
 
     /// Samples of a window under one view, [y, x, light, channel].
-    pub fn read_reflectance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
-        let Description { lights, channels, .. } = &self.description;
+    pub fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
         let Window { y, x, size } = window;
-        self.store.read_box(
-            &self.reflectance,
-            &[view as u64, y as u64, x as u64, 0, 0],
-            &[1, size.height as u64, size.width as u64, lights.len() as u64, *channels as u64],
-        )
+        let start = [view as u64, y as u64, x as u64, 0, 0];
+        let [lights, channels] = [self.description.lights.len(), self.description.n_channels()];
+        let extent = [1, size.height as u64, size.width as u64, lights as u64, channels as u64];
+        self.store.read_samples(&self.reflectance, self.description.sample_type, &start, &extent)
     }
 
     /// L* codes of a window under one view, [y, x, light].
@@ -261,14 +235,57 @@ impl Measurement {
     }
 }
 
+impl Views for Measurement {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn read_view(&self, view: usize, window: Window) -> Result<Samples> {
+        self.read_reflectance(view, window)
+    }
+}
+
+/// The two arrays of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleArray {
+    /// Samples as measured.
+    Reflectance,
+    /// L* codes.
+    Luminance,
+}
+
+impl SampleArray {
+    /// Name in the store.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reflectance => "reflectance",
+            Self::Luminance => "luminance",
+        }
+    }
+}
+
+/// Where a measurement comes from.
+pub struct Origin<'a> {
+    /// Everything that its bytes depend on.
+    pub recipe: &'a Value,
+    /// What had to be assumed because the archive does not say it.
+    pub assumptions: &'a [String],
+    /// What else the archive says of itself.
+    pub remarks: &'a [(String, String)],
+}
+
 fn create_reflectance(store: &Store, description: &Description, side: usize) -> Result<Array> {
-    let mut layout =
-        sample_layout(description, &["view", "y", "x", "light", "channel"], description.channels, side);
-    let names: &[&str] = if description.channels == 3 { &["R", "G", "B"] } else { &["Y"] };
-    layout.attributes.insert("channels".to_owned(), json!(names));
-    layout
-        .attributes
-        .insert("units".to_owned(), json!("reflectance, 255 = 1, through the transfer curve of the group"));
+    let names = ["view", "y", "x", "light", "channel"];
+    let mut layout = sample_layout(description, &names, description.n_channels(), side);
+    layout.data_type = crate::store::data_type_of(description.sample_type);
+    layout.attributes.insert("channels".to_owned(), json!(description.channels));
+    let one = match description.sample_type {
+        SampleType::U8 => "255 = 1",
+        SampleType::U16 => "65535 = 1",
+        SampleType::F16 | SampleType::F32 => "1.0 = 1",
+    };
+    let units = format!("reflectance, {one}, through the transfer curve of the group");
+    layout.attributes.insert("units".to_owned(), json!(units));
     store.create_array("reflectance", &layout)
 }
 
@@ -295,7 +312,7 @@ fn sample_layout<'a>(
         shape: vec![description.views.len() as u64, height as u64, width as u64, lights, channels],
         chunk: vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, lights, channels],
         shard: Some(vec![1, side, side, lights, channels]),
-        data_type: <u8 as crate::store::Named>::data_type(),
+        data_type: u8::data_type(),
         names,
         attributes: Map::new(),
     }
@@ -337,38 +354,66 @@ pub(crate) fn read_directions(store: &Store, name: &str) -> Result<Vec<Direction
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::color::{LightnessCodes, Transfer};
     use crate::random::Hash;
+    use crate::store::gather::{Images, images_of_texels};
+    use btfkit_formats::f16;
 
-    fn description(size: Size) -> Description {
+    fn description(size: Size, sample_type: SampleType) -> Description {
         let direction = |n: u32| Direction::from_degrees(f64::from(n), 0.0);
         let (views, lights) = ((0..2).map(direction).collect(), (0..5).map(direction).collect());
-        Description { size, channels: 3, views, lights, transfer: Transfer::Srgb, white: 1.0 }
+        let channels = ["R", "G", "B"].map(str::to_owned).to_vec();
+        Description { size, channels, sample_type, views, lights, transfer: Transfer::Srgb, white: 1.0 }
+    }
+
+    fn noise(sample_type: SampleType, count: usize) -> Samples {
+        let hash = Hash::new(1, 0);
+        let numbers = (0..count as u32).map(|n| hash.words(n, 0, 0)[0]);
+        match sample_type {
+            SampleType::U8 => Samples::U8(numbers.map(|n| n as u8).collect()),
+            SampleType::U16 => Samples::U16(numbers.map(|n| n as u16).collect()),
+            SampleType::F16 => Samples::F16(numbers.map(|n| f16::from_bits(n as u16 >> 2)).collect()),
+            SampleType::F32 => Samples::F32(numbers.map(|n| n as f32 / 4e9).collect()),
+        }
     }
 
     #[test]
     fn planes_in_one_shard_and_in_many_give_back_what_was_written() {
-        let hash = Hash::new(1, 0);
-        for (size, limit, side) in [
-            (Size::new(32, 32), SHARD_LIMIT_BYTES, 32),
-            (Size::new(19, 41), SHARD_LIMIT_BYTES, 48),
-            (Size::new(37, 50), 16 * 16 * 15, 16),
+        for (size, limit, side, sample_type) in [
+            (Size::new(32, 32), SHARD_LIMIT_BYTES, 32, SampleType::U8),
+            (Size::new(19, 41), SHARD_LIMIT_BYTES, 48, SampleType::F16),
+            (Size::new(37, 50), 16 * 16 * 15 * 2, 16, SampleType::U16),
+            (Size::new(37, 50), 16 * 16 * 15 * 4, 16, SampleType::F32),
         ] {
             let folder = tempfile::tempdir().unwrap();
             let recipe = json!({"size": size.to_string()});
-            let measurement =
-                Measurement::create_in_shards(folder.path(), description(size), &recipe, limit).unwrap();
+            let origin = Origin { recipe: &recipe, assumptions: &[], remarks: &[] };
+            let description = description(size, sample_type);
+            let measurement = Measurement::create_in_shards(
+                folder.path(),
+                description.clone(),
+                Codec::Stock,
+                &origin,
+                limit,
+            )
+            .unwrap();
             assert_eq!(measurement.side, side);
-            let bytes = |count: usize, salt: u32| -> Vec<u8> {
-                (0..count as u32).map(|n| hash.words(n, salt, 0)[0] as u8).collect()
-            };
-            let (samples, codes) = (bytes(size.texels() * 15, 0), bytes(size.texels() * 5, 1));
-            measurement.write_view(1, samples.clone(), codes.clone()).unwrap();
+            let images = noise(sample_type, size.texels() * 15);
+            let codes =
+                LightnessCodes::new(Transfer::Srgb, sample_type, &description.channels, 1.0).unwrap();
+            let groups = vec![(0..5, images.clone())];
+            let view = Images::new(size, 3, sample_type, groups).unwrap();
+            measurement.write_view(1, &view, &codes).unwrap();
             let measurement = Measurement::open(folder.path()).unwrap();
             assert!(measurement.has_view(1) && !measurement.has_view(0));
-            assert_eq!(measurement.read_reflectance(1, size.window()).unwrap(), samples);
-            assert_eq!(measurement.read_luminance(1, size.window()).unwrap(), codes);
+            let texels = measurement.read_reflectance(1, size.window()).unwrap();
+            assert_eq!(images_of_texels(&texels, 5, 3), images);
+            let mut expected = vec![0; size.texels() * 5];
+            codes.fill(&texels, &mut expected);
+            assert_eq!(measurement.read_luminance(1, size.window()).unwrap(), expected);
             let window = Window { y: 14, x: 13, size: Size::new(5, 19) };
-            let rows = (14..19).flat_map(|y| &codes[(y * size.width + 13) * 5..(y * size.width + 32) * 5]);
+            let rows =
+                (14..19).flat_map(|y| &expected[(y * size.width + 13) * 5..(y * size.width + 32) * 5]);
             assert_eq!(measurement.read_luminance(1, window).unwrap(), rows.copied().collect::<Vec<u8>>());
         }
     }

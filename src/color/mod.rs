@@ -2,6 +2,12 @@
 //!
 //! Linear RGB has the sRGB primaries and white D65; 1.0 is a perfect diffuser lit frontally.
 
+mod channels;
+mod codes;
+
+pub use channels::{Decoder, Weights, weights};
+pub use codes::{LightnessCodes, Remarkable};
+
 use serde::{Deserialize, Serialize};
 
 /// Weights of linear R, G, B in the luminance Y (IEC 61966-2-1).
@@ -11,50 +17,44 @@ pub const LUMINANCE_WEIGHTS: [f64; 3] = [0.2126, 0.7152, 0.0722];
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Transfer {
-    /// The sRGB curve; a sample of 255 is reflectance 1.
+    /// The sRGB curve; the largest integer, or 1.0, is reflectance 1.
     Srgb,
-    /// Proportional; a sample of 255 is reflectance 1.
+    /// Proportional; the largest integer, or 1.0, is reflectance 1.
     Linear,
 }
 
 impl Transfer {
-    /// Linear reflectance of an 8-bit sample.
-    pub fn decode(self, sample: u8) -> f64 {
-        let value = f64::from(sample) / 255.0;
+    /// Linear reflectance of a sample on the scale where 1.0 is reflectance 1.
+    pub fn decode(self, value: f64) -> f64 {
         match self {
             Self::Srgb => srgb_decode(value),
             Self::Linear => value,
         }
     }
 
-    /// Linear reflectance of every 8-bit sample.
-    pub fn table(self) -> [f64; 256] {
-        std::array::from_fn(|sample| self.decode(sample as u8))
+    /// The sample of a linear reflectance, not clipped.
+    pub fn encode(self, linear: f64) -> f64 {
+        match self {
+            Self::Srgb if linear <= 0.003_130_8 => linear * 12.92,
+            Self::Srgb => 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055,
+            Self::Linear => linear,
+        }
     }
 }
 
-/// Inverse of the sRGB curve: 0..1 to linear 0..1.
+/// Inverse of the sRGB curve: 0..1 to linear 0..1; continued above 1, straight below 0.
 pub fn srgb_decode(value: f64) -> f64 {
     if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
 }
 
 /// The sRGB curve: linear 0..1 to 0..1; values outside are clipped.
 pub fn srgb_encode(linear: f64) -> f64 {
-    let linear = linear.clamp(0.0, 1.0);
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
+    Transfer::Srgb.encode(linear.clamp(0.0, 1.0))
 }
 
 /// The 8-bit display value of a linear value.
 pub fn srgb_encode_u8(linear: f64) -> u8 {
     (srgb_encode(linear) * 255.0).round() as u8
-}
-
-/// Luminance Y of linear RGB; a single channel is its own luminance.
-pub fn luminance(linear: &[f64]) -> f64 {
-    match linear {
-        [r, g, b] => LUMINANCE_WEIGHTS[0] * r + LUMINANCE_WEIGHTS[1] * g + LUMINANCE_WEIGHTS[2] * b,
-        _ => linear.first().copied().unwrap_or(0.0),
-    }
 }
 
 /// CIE 1976 L* of a luminance relative to white; 0..100 for 0..1, not clipped above.
@@ -125,59 +125,8 @@ pub fn ciede2000(first: [f64; 3], second: [f64; 3]) -> f64 {
     (dl * dl + dc * dc + dh * dh + rotation * dc * dh).max(0.0).sqrt()
 }
 
-/// Turns 8-bit samples into L* codes by whole-number arithmetic, as fast as three table reads.
-///
-/// Luminance is summed in units of 2^-40, so the code equals that of the f64 formula for every colour.
-pub struct LightnessCodes {
-    /// Luminance of each sample in each channel, units of 2^-40 of white.
-    weighted: Vec<[u64; 256]>,
-    /// Least luminance of each code above 0, in the same unit.
-    threshold: [u64; 256],
-    /// First guess of the code from the leading bits of the luminance.
-    guess: Vec<u8>,
-}
-
-const LUMINANCE_BITS: u32 = 40;
-const GUESS_BITS: u32 = 12;
-
-impl LightnessCodes {
-    /// For samples of 1 or 3 channels; `white` is the reflectance that counts as L* = 100.
-    pub fn new(transfer: Transfer, channels: usize, white: f64) -> Self {
-        let unit = (1u64 << LUMINANCE_BITS) as f64;
-        let weights: &[f64] = if channels == 3 { &LUMINANCE_WEIGHTS } else { &[1.0] };
-        let linear = transfer.table();
-        let weighted = weights
-            .iter()
-            .map(|weight| {
-                std::array::from_fn(|sample| (weight * linear[sample] / white * unit).round() as u64)
-            })
-            .collect();
-        let threshold = std::array::from_fn(|code| {
-            if code == 0 { 0 } else { (inverse_lightness((code as f64 - 0.5) / 2.55) * unit).ceil() as u64 }
-        });
-        let code_of = |y: u64| threshold.partition_point(|&least| least <= y) as u8 - 1;
-        let guess =
-            (0..=1u64 << GUESS_BITS).map(|lead| code_of(lead << (LUMINANCE_BITS - GUESS_BITS))).collect();
-        Self { weighted, threshold, guess }
-    }
-
-    /// The code of one texel's samples, and whether its luminance exceeds white.
-    #[inline]
-    pub fn code(&self, samples: &[u8]) -> (u8, bool) {
-        let white = 1u64 << LUMINANCE_BITS;
-        let sum: u64 = self.weighted.iter().zip(samples).map(|(table, &s)| table[usize::from(s)]).sum();
-        let y = sum.min(white);
-        let mut code = self.guess[(y >> (LUMINANCE_BITS - GUESS_BITS)) as usize];
-        while code < 255 && y >= self.threshold[usize::from(code) + 1] {
-            code += 1;
-        }
-        // Rounding of the three weights may lift white itself by a unit or two.
-        (code, sum > white + 4)
-    }
-}
-
 /// Luminance of an L* value.
-fn inverse_lightness(l: f64) -> f64 {
+pub(crate) fn inverse_lightness(l: f64) -> f64 {
     const DELTA: f64 = 6.0 / 29.0;
     let f = (l + 16.0) / 116.0;
     if f > DELTA { f * f * f } else { 3.0 * DELTA * DELTA * (f - 4.0 / 29.0) }
@@ -188,31 +137,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_8_bit_colour_has_the_code_of_the_formula() {
-        let codes = LightnessCodes::new(Transfer::Srgb, 3, 1.0);
-        let linear = Transfer::Srgb.table();
-        for r in (0..256).step_by(5) {
-            for g in 0..256 {
-                for b in (0..256).step_by(3) {
-                    let y = luminance(&[linear[r], linear[g], linear[b]]);
-                    let (code, clipped) = codes.code(&[r as u8, g as u8, b as u8]);
-                    assert_eq!(code, lightness_code(y), "at {r} {g} {b}");
-                    assert!(!clipped);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn samples_above_white_are_counted_as_clipped() {
-        let codes = LightnessCodes::new(Transfer::Linear, 1, 0.5);
-        assert_eq!(codes.code(&[255]), (255, true));
-        assert_eq!(codes.code(&[127]), (lightness_code(127.0 / 255.0 / 0.5), false));
-    }
-
-    #[test]
     fn the_srgb_curve_gives_every_sample_back() {
-        assert!((0..=255).all(|sample| srgb_encode_u8(Transfer::Srgb.decode(sample)) == sample));
+        assert!((0..=255u8).all(|s| srgb_encode_u8(Transfer::Srgb.decode(f64::from(s) / 255.0)) == s));
     }
 
     #[test]

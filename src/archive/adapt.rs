@@ -1,0 +1,296 @@
+//! Mending what is known to be wrong with an archive while it is read: directions that are mirrored, turned or
+//! exchanged, images that are transposed, a cosine that is missing, samples of an unwanted type.
+
+use std::ops::Range;
+use std::path::Path;
+
+use btfkit_formats::{Contents, Direction, SampleType, Samples, f16};
+use serde::{Deserialize, Serialize};
+
+use super::Source;
+use crate::color::Transfer;
+use crate::error::{Error, Result};
+use crate::run::Context;
+
+/// Which azimuths run the wrong way round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mirrored {
+    /// Of lights and views.
+    Both,
+    /// Of lights.
+    Lights,
+    /// Of views.
+    Views,
+}
+
+/// What is to be done to every image and direction of an archive. The default does nothing.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Adaptation {
+    /// Views of the archive that are left out.
+    pub drop_views: Vec<usize>,
+    /// What the archive calls light is the view, and the other way round.
+    pub swap: bool,
+    /// Azimuths run clockwise.
+    pub mirrored: Option<Mirrored>,
+    /// Counter-clockwise turn of all directions, degrees: a multiple of 90.
+    pub turn_deg: u16,
+    /// Rows and columns of the images are exchanged.
+    pub transpose: bool,
+    /// The cosine of the light angle is not in the archive's values: it is multiplied in.
+    pub cosine_excluded: bool,
+    /// The transfer curve of the archive's samples, where its own word is not taken.
+    pub transfer: Option<Transfer>,
+    /// Samples are converted to this type.
+    pub samples: Option<Type>,
+}
+
+/// A sample type by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Type {
+    /// 8-bit.
+    U8,
+    /// 16-bit.
+    U16,
+    /// Half precision.
+    F16,
+    /// Single precision.
+    F32,
+}
+
+impl From<Type> for SampleType {
+    fn from(name: Type) -> Self {
+        match name {
+            Type::U8 => Self::U8,
+            Type::U16 => Self::U16,
+            Type::F16 => Self::F16,
+            Type::F32 => Self::F32,
+        }
+    }
+}
+
+/// The source as it should have been.
+///
+/// # Errors
+/// A view to drop that there is none of, or no view left.
+pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<Box<dyn Source>> {
+    let of = inner.contents();
+    let cosine = adaptation.cosine_excluded || !of.cosine_included;
+    let unchanged = Adaptation { samples: None, ..adaptation.clone() } == Adaptation::default();
+    let wanted = adaptation.samples.map_or(of.sample_type, SampleType::from);
+    if unchanged && !cosine && wanted == of.sample_type {
+        return Ok(inner);
+    }
+    let mut contents = of.clone();
+    let [mut views, mut lights] = [of.views.clone(), of.lights.clone()];
+    if adaptation.swap {
+        std::mem::swap(&mut views, &mut lights);
+    }
+    if let Some(&beyond) = adaptation.drop_views.iter().find(|&&view| view >= views.len()) {
+        let found = format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
+        return Err(Error::input(found));
+    }
+    let kept: Vec<usize> = (0..views.len()).filter(|view| !adaptation.drop_views.contains(view)).collect();
+    if kept.is_empty() {
+        return Err(Error::input(format!("{}: no view is left", inner.path().display())));
+    }
+    let turn = f64::from(adaptation.turn_deg).to_radians();
+    let turned = |direction: &Direction, mirrored: bool| {
+        let phi = if mirrored { -direction.phi_rad } else { direction.phi_rad };
+        Direction { phi_rad: (phi + turn).rem_euclid(std::f64::consts::TAU), ..*direction }
+    };
+    let mirrored = |one| matches!(adaptation.mirrored, Some(found) if found == Mirrored::Both || found == one);
+    contents.views = kept.iter().map(|&view| turned(&views[view], mirrored(Mirrored::Views))).collect();
+    contents.lights = lights.iter().map(|light| turned(light, mirrored(Mirrored::Lights))).collect();
+    if adaptation.transpose {
+        (contents.width, contents.height) = (contents.height, contents.width);
+    }
+    if let Some(transfer) = adaptation.transfer {
+        contents.linear = transfer == Transfer::Linear;
+    }
+    contents.sample_type = wanted;
+    contents.cosine_included = true;
+    let cosines = cosine.then(|| contents.lights.iter().map(|light| light.vector()[2]).collect());
+    Ok(Box::new(Adapted { inner, contents, kept, swap: adaptation.swap, transpose: adaptation.transpose, cosines }))
+}
+
+struct Adapted {
+    inner: Box<dyn Source>,
+    contents: Contents,
+    /// The inner source's number of each view (of each light, where they are exchanged).
+    kept: Vec<usize>,
+    swap: bool,
+    transpose: bool,
+    /// What each light's samples are multiplied by, in linear light.
+    cosines: Option<Vec<f64>>,
+}
+
+impl Source for Adapted {
+    fn path(&self) -> &Path {
+        self.inner.path()
+    }
+
+    fn contents(&self) -> &Contents {
+        &self.contents
+    }
+
+    fn lights_at_once(&self) -> usize {
+        if self.swap { 1 } else { self.inner.lights_at_once() }
+    }
+
+    fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
+        let view = *self.kept.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
+        let mut samples = if self.swap {
+            let mut samples = Samples::none(self.inner.contents().sample_type);
+            for light in lights.clone() {
+                samples.append(&self.inner.read_images(light, view..view + 1)?);
+            }
+            samples
+        } else {
+            self.inner.read_images(view, lights.clone())?
+        };
+        let Contents { width, height, channels, .. } = &self.contents;
+        if self.transpose {
+            samples = transposed(&samples, *height as usize, *width as usize, channels.len());
+        }
+        let image = *width as usize * *height as usize * channels.len();
+        if let Some(cosines) = &self.cosines {
+            let transfer = if self.contents.linear { Transfer::Linear } else { Transfer::Srgb };
+            let times = |at: usize, value: f64| {
+                let cosine = cosines[lights.start + at / image];
+                transfer.encode(transfer.decode(value) * cosine)
+            };
+            samples = mapped(&samples, self.contents.sample_type, times);
+        } else if samples.sample_type() != self.contents.sample_type {
+            samples = mapped(&samples, self.contents.sample_type, |_, value| value);
+        }
+        Ok(samples)
+    }
+
+    fn check(&self, context: &Context<'_>) -> Result<String> {
+        self.inner.check(context)
+    }
+}
+
+/// Images of `height` rows and `width` columns out of images of `width` rows and `height` columns.
+fn transposed(samples: &Samples, height: usize, width: usize, channels: usize) -> Samples {
+    let image = height * width * channels;
+    let images = samples.len() / image.max(1);
+    let pixels = (0..images).flat_map(|n| {
+        (0..height).flat_map(move |y| {
+            (0..width).map(move |x| {
+                let at = n * image + (x * height + y) * channels;
+                at..at + channels
+            })
+        })
+    });
+    samples.select(pixels).unwrap_or_else(|| Samples::none(samples.sample_type()))
+}
+
+/// Samples of a type, each a function of its place and its value on the scale where 1.0 is reflectance 1.
+/// Integers are rounded and clipped.
+fn mapped(samples: &Samples, sample_type: SampleType, of: impl Fn(usize, f64) -> f64) -> Samples {
+    let values = (0..samples.len()).map(|at| of(at, samples.value(at).unwrap_or(0.0)));
+    match sample_type {
+        SampleType::U8 => Samples::U8(values.map(|v| (255.0 * v).round() as u8).collect()),
+        SampleType::U16 => Samples::U16(values.map(|v| (65535.0 * v).round() as u16).collect()),
+        SampleType::F16 => Samples::F16(values.map(f16::from_f64).collect()),
+        SampleType::F32 => Samples::F32(values.map(|v| v as f32).collect()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// 2 views, 3 lights, 2 rows, 3 columns, one channel: every sample tells its place.
+    struct Made(Contents);
+
+    fn made(cosine_included: bool) -> Box<dyn Source> {
+        let directions = |n: u32| (0..n).map(|k| Direction::from_degrees(60.0, 30.0 * f64::from(k))).collect();
+        Box::new(Made(Contents {
+            format: "made".to_owned(),
+            width: 3,
+            height: 2,
+            channels: vec!["Y".to_owned()],
+            sample_type: SampleType::U8,
+            views: directions(2),
+            lights: directions(3),
+            linear: true,
+            cosine_included,
+            assumptions: Vec::new(),
+            remarks: Vec::new(),
+        }))
+    }
+
+    impl Source for Made {
+        fn path(&self) -> &Path {
+            Path::new("made")
+        }
+        fn contents(&self) -> &Contents {
+            &self.0
+        }
+        fn lights_at_once(&self) -> usize {
+            2
+        }
+        fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
+            let sample = |light: usize, at: usize| (100 * view + 20 * light + at) as u8;
+            Ok(Samples::U8(lights.flat_map(|light| (0..6).map(move |at| sample(light, at))).collect()))
+        }
+        fn check(&self, _: &Context<'_>) -> Result<String> {
+            Ok(String::new())
+        }
+    }
+
+    #[test]
+    fn nothing_to_do_is_nothing_done() {
+        let source = adapt(made(true), &Adaptation::default()).unwrap();
+        assert_eq!(source.lights_at_once(), 2);
+        assert_eq!(source.read_images(1, 2..3).unwrap(), Samples::U8(vec![140, 141, 142, 143, 144, 145]));
+    }
+
+    #[test]
+    fn views_and_lights_are_exchanged_dropped_mirrored_and_turned() {
+        let adaptation = Adaptation {
+            swap: true,
+            drop_views: vec![1],
+            mirrored: Some(Mirrored::Lights),
+            turn_deg: 90,
+            ..Adaptation::default()
+        };
+        let source = adapt(made(true), &adaptation).unwrap();
+        let degrees = |list: &[Direction]| list.iter().map(|d| d.degrees().1.round()).collect::<Vec<_>>();
+        assert_eq!(degrees(&source.contents().views), [90.0, 150.0]);
+        assert_eq!(degrees(&source.contents().lights), [90.0, 60.0]);
+        let Samples::U8(found) = source.read_images(1, 0..2).unwrap() else { unreachable!() };
+        assert_eq!((found[0], found[6]), (40, 140), "view 1 of the result was light 2");
+        assert!(adapt(made(true), &Adaptation { drop_views: vec![2], ..Adaptation::default() }).is_err());
+    }
+
+    #[test]
+    fn images_are_transposed_and_converted() {
+        let adaptation =
+            Adaptation { transpose: true, samples: Some(Type::F32), ..Adaptation::default() };
+        let source = adapt(made(true), &adaptation).unwrap();
+        assert_eq!((source.contents().width, source.contents().height), (2, 3));
+        let found = source.read_images(0, 1..2).unwrap();
+        let expected: Vec<f32> = [20, 23, 21, 24, 22, 25].iter().map(|&s| s as f32 / 255.0).collect();
+        assert_eq!(found, Samples::F32(expected));
+    }
+
+    #[test]
+    fn a_missing_cosine_is_multiplied_in() {
+        for source in [
+            adapt(made(false), &Adaptation::default()),
+            adapt(made(true), &Adaptation { cosine_excluded: true, ..Adaptation::default() }),
+        ] {
+            let source = source.unwrap();
+            assert!(source.contents().cosine_included);
+            // cos 60 degrees is one half.
+            assert_eq!(source.read_images(1, 2..3).unwrap(), Samples::U8(vec![70, 71, 71, 72, 72, 73]));
+        }
+    }
+}

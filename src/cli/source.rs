@@ -1,0 +1,96 @@
+//! What a reader of archives is told at the command line; the same for every command that reads one.
+
+use std::path::PathBuf;
+
+use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
+use btfkit::archive::{self, Source};
+use btfkit::color::Transfer;
+use btfkit::error::Result;
+use clap::{Args, ValueEnum};
+
+/// How to read an archive that does not say everything, or says it wrong.
+#[derive(Args, Clone)]
+#[command(next_help_heading = "Reading the archive")]
+pub(super) struct SourceArgs {
+    /// Transfer curve of the samples [default: the archive's; sRGB for 8-bit images, linear for floats]
+    #[arg(long, value_enum)]
+    pub(super) transfer: Option<Curve>,
+    /// Convert samples to this type [default: as they are]
+    #[arg(long, value_enum)]
+    samples: Option<SampleName>,
+    /// Azimuths run clockwise
+    #[arg(long, value_enum)]
+    azimuth: Option<Azimuth>,
+    /// Turn all directions counter-clockwise
+    #[arg(long, value_parser = ["90", "180", "270"])]
+    turn: Option<String>,
+    /// Rows and columns of the images are exchanged
+    #[arg(long)]
+    transpose: bool,
+    /// What the archive calls light is the view, and the other way round
+    #[arg(long)]
+    swap: bool,
+    /// `excluded`: the cosine of the light angle is not in the values, so multiply it in
+    #[arg(long, value_parser = ["excluded"])]
+    cosine: Option<String>,
+    /// Leave out a view, by its number in the archive; may be given several times
+    #[arg(long, value_name = "N")]
+    drop_view: Vec<usize>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(super) enum Curve {
+    Srgb,
+    Linear,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SampleName {
+    U8,
+    U16,
+    F16,
+    F32,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Azimuth {
+    Mirrored,
+    MirroredLights,
+    MirroredViews,
+}
+
+impl SourceArgs {
+    pub(super) fn options(&self) -> archive::Options {
+        archive::Options { adaptation: self.adaptation() }
+    }
+
+    fn adaptation(&self) -> Adaptation {
+        Adaptation {
+            drop_views: self.drop_view.clone(),
+            swap: self.swap,
+            mirrored: self.azimuth.map(|azimuth| match azimuth {
+                Azimuth::Mirrored => Mirrored::Both,
+                Azimuth::MirroredLights => Mirrored::Lights,
+                Azimuth::MirroredViews => Mirrored::Views,
+            }),
+            turn_deg: self.turn.as_ref().and_then(|turn| turn.parse().ok()).unwrap_or(0),
+            transpose: self.transpose,
+            cosine_excluded: self.cosine.is_some(),
+            transfer: self.transfer.map(|curve| match curve {
+                Curve::Srgb => Transfer::Srgb,
+                Curve::Linear => Transfer::Linear,
+            }),
+            samples: self.samples.map(|name| match name {
+                SampleName::U8 => Type::U8,
+                SampleName::U16 => Type::U16,
+                SampleName::F16 => Type::F16,
+                SampleName::F32 => Type::F32,
+            }),
+        }
+    }
+
+    /// Opens the archive at one path, or in pieces at several.
+    pub(super) fn open(&self, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+        archive::open(paths, &self.options())
+    }
+}

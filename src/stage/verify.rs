@@ -1,0 +1,159 @@
+//! Is a measurement whole and undamaged, and does it hold what its archive holds?
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use serde::Serialize;
+
+use crate::archive::Source;
+use crate::color::Remarkable;
+use crate::error::{Error, Result};
+use crate::run::progress::Counted;
+use crate::run::{Context, units};
+use crate::shape::Window;
+use crate::store::gather::{self, Images};
+use crate::store::measurement::{Measurement, SampleArray};
+
+/// What was found.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Views that are there.
+    pub views_found: usize,
+    /// Views that have not been written.
+    pub views_missing: Vec<usize>,
+    /// Chunks that cannot be decoded, or whose L* codes are not those of their samples.
+    pub damaged: Vec<Damage>,
+    /// Samples beyond their range.
+    pub samples: Remarkable,
+    /// Samples that differ from the archive's, where it was compared.
+    pub different: Option<u64>,
+    /// Images with such samples, (view, light): the first of them.
+    pub different_images: Vec<(usize, usize)>,
+}
+
+/// A chunk that is not as it should be.
+#[derive(Clone, Debug, Serialize)]
+pub struct Damage {
+    /// The array.
+    pub array: &'static str,
+    /// The view.
+    pub view: usize,
+    /// Row and column of the chunk's first texel.
+    pub texel: [usize; 2],
+    /// The file that it lies in.
+    pub file: String,
+    /// What is wrong.
+    pub what: String,
+}
+
+/// Images with differences that are named one by one.
+const NAMED_IMAGES: usize = 20;
+
+/// Reads all of a measurement and, where a source is given, all of its archive.
+pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Context<'_>) -> Result<Report> {
+    let description = measurement.description();
+    if let Some(source) = source {
+        expect_same_shape(measurement, source)?;
+    }
+    let (found, missing): (Vec<usize>, Vec<usize>) =
+        (0..description.views.len()).partition(|&view| measurement.has_view(view));
+    context.progress.begin("verify", found.len() as u64, Counted::Items("views"));
+    let copies = if source.is_some() { 4 } else { 2 };
+    let in_flight = units::in_flight(context, copies * description.view_bytes());
+    let different = AtomicU64::new(0);
+    let views = units::for_each(context, &found, in_flight, |&view| {
+        let (damaged, remarkable) = verify_view(measurement, view)?;
+        let mut images = Vec::new();
+        if let Some(source) = source.filter(|_| damaged.is_empty()) {
+            let lights = 0..description.lights.len();
+            let samples = source.read_images(view, lights.clone())?;
+            let expected = Images::new(description.size, description.n_channels(), description.sample_type, vec![(lights, samples)])?;
+            let (count, lights) = compare(measurement, view, &expected)?;
+            different.fetch_add(count, Ordering::Relaxed);
+            images.extend(lights.into_iter().map(|light| (view, light)));
+        }
+        context.progress.advance(1);
+        Ok((damaged, remarkable, images))
+    })?;
+    context.progress.end();
+    let mut report = Report {
+        views_found: found.len(),
+        views_missing: missing,
+        different: source.map(|_| different.into_inner()),
+        ..Report::default()
+    };
+    for (damaged, remarkable, images) in views {
+        report.damaged.extend(damaged);
+        report.samples += remarkable;
+        report.different_images.extend(images);
+    }
+    report.different_images.truncate(NAMED_IMAGES);
+    Ok(report)
+}
+
+fn expect_same_shape(measurement: &Measurement, source: &dyn Source) -> Result<()> {
+    let (description, contents) = (measurement.description(), source.contents());
+    let found = (contents.width as usize, contents.height as usize, contents.channels.len(), contents.views.len(), contents.lights.len(), contents.sample_type);
+    let expected = (description.size.width, description.size.height, description.n_channels(), description.views.len(), description.lights.len(), description.sample_type);
+    if found == expected {
+        return Ok(());
+    }
+    Err(Error::input(format!(
+        "{} holds {found:?} (width, height, channels, views, lights, type), {} holds {expected:?}",
+        source.path().display(),
+        measurement.path().display()
+    ))
+    .hint("give the options that the import was given"))
+}
+
+/// Decodes a view, chunk by chunk where it cannot be decoded whole, and works out its L* codes again.
+fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, Remarkable)> {
+    let description = measurement.description();
+    let codes = description.codes()?;
+    let mut damaged = Vec::new();
+    let mut remarkable = Remarkable::default();
+    let whole = description.size.window();
+    let check = |window: Window| -> std::result::Result<(bool, Remarkable), (SampleArray, Error)> {
+        let samples =
+            measurement.read_reflectance(view, window).map_err(|error| (SampleArray::Reflectance, error))?;
+        let stored = measurement.read_luminance(view, window).map_err(|error| (SampleArray::Luminance, error))?;
+        let mut expected = vec![0; stored.len()];
+        let remarkable = codes.fill(&samples, &mut expected);
+        Ok((stored == expected, remarkable))
+    };
+    if let Ok((true, found)) = check(whole) {
+        return Ok((damaged, found));
+    }
+    for window in measurement.chunk_windows() {
+        let (array, what) = match check(window) {
+            Ok((true, found)) => {
+                remarkable += found;
+                continue;
+            }
+            Ok((false, _)) => (SampleArray::Luminance, "L* codes that are not those of the samples".to_owned()),
+            Err((array, error)) => (array, error.to_string()),
+        };
+        let file = measurement.shard_path(array, view, window).display().to_string();
+        damaged.push(Damage { array: array.name(), view, texel: [window.y, window.x], file, what });
+    }
+    Ok((damaged, remarkable))
+}
+
+/// Samples of a view that differ from these images, and the lights of the images with some.
+fn compare(measurement: &Measurement, view: usize, expected: &Images) -> Result<(u64, Vec<usize>)> {
+    let description = measurement.description();
+    let (lights, channels) = (description.lights.len(), description.n_channels());
+    let mut by_light = vec![0u64; lights];
+    for window in measurement.chunk_row_windows() {
+        let [found, expected] = [measurement.read_reflectance(view, window)?, expected.gather(window)];
+        let [found, expected] = [gather::bytes(&found), gather::bytes(&expected)];
+        if found == expected {
+            continue;
+        }
+        let sample = description.sample_type.bytes();
+        for (at, (a, b)) in found.chunks_exact(sample).zip(expected.chunks_exact(sample)).enumerate() {
+            by_light[at / channels % lights] += u64::from(a != b);
+        }
+    }
+    let different = (0..lights).filter(|&light| by_light[light] > 0).collect();
+    Ok((by_light.iter().sum(), different))
+}

@@ -1,0 +1,81 @@
+//! What a measurement holds: sizes, directions, and how samples are meant.
+
+use btfkit_formats::SampleType;
+
+use super::CHUNK_SIDE;
+use crate::color::{Decoder, LightnessCodes, Transfer};
+use crate::error::Result;
+use crate::shape::Size;
+use btfkit_formats::Direction;
+
+/// Most bytes of samples in one shard.
+pub(super) const SHARD_LIMIT_BYTES: usize = 256 << 20;
+
+/// Sizes, directions, and how samples are meant.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// Rows and columns of the rectified images.
+    pub size: Size,
+    /// Names of the channels: Y; R, G, B; X, Y, Z; or wavelengths in nanometres.
+    pub channels: Vec<String>,
+    /// Type of the samples.
+    pub sample_type: SampleType,
+    /// View directions, in the order of the arrays.
+    pub views: Vec<Direction>,
+    /// Light directions, the same for all views.
+    pub lights: Vec<Direction>,
+    /// Transfer curve of the samples.
+    pub transfer: Transfer,
+    /// Reflectance that counts as L* = 100.
+    pub white: f64,
+}
+
+impl Description {
+    /// Samples of a texel under one pair of directions.
+    pub fn n_channels(&self) -> usize {
+        self.channels.len()
+    }
+
+    /// Samples of a texel under one view.
+    pub fn texel_samples(&self) -> usize {
+        self.lights.len() * self.channels.len()
+    }
+
+    /// Bytes of a texel under one view.
+    pub fn texel_bytes(&self) -> usize {
+        self.texel_samples() * self.sample_type.bytes()
+    }
+
+    /// Bytes of one view's samples.
+    pub fn view_bytes(&self) -> u64 {
+        self.size.texels() as u64 * self.texel_bytes() as u64
+    }
+
+    /// Bytes of all samples.
+    pub fn bytes(&self) -> u64 {
+        self.view_bytes() * self.views.len() as u64
+    }
+
+    /// What turns its samples into linear RGB.
+    ///
+    /// # Errors
+    /// Channels that are not understood.
+    pub fn decoder(&self) -> Result<Decoder> {
+        Decoder::new(self.transfer, self.sample_type, &self.channels)
+    }
+
+    /// What turns its samples into L* codes.
+    ///
+    /// # Errors
+    /// Channels that are not understood.
+    pub fn codes(&self) -> Result<LightnessCodes> {
+        LightnessCodes::new(self.transfer, self.sample_type, &self.channels, self.white)
+    }
+
+    /// Side of a shard: the whole plane, or as much as keeps a shard within `limit_bytes`.
+    pub(super) fn shard_side(&self, limit_bytes: usize) -> usize {
+        let affordable = (limit_bytes / self.texel_bytes().max(1)).isqrt() / CHUNK_SIDE * CHUNK_SIDE;
+        let plane = self.size.height.max(self.size.width).next_multiple_of(CHUNK_SIDE);
+        plane.min(affordable.max(CHUNK_SIDE))
+    }
+}

@@ -1,0 +1,94 @@
+//! Writing one view: chunks gathered from its images, coded and encoded by many threads, one file a shard.
+
+use rayon::prelude::*;
+
+use super::{CHUNK_SIDE, Measurement};
+use crate::color::{LightnessCodes, Remarkable};
+use crate::error::Result;
+use crate::shape::{Size, Window};
+use crate::store::chunk::Encoder;
+use crate::store::gather::{self, Images};
+use crate::store::shard;
+
+/// A chunk of both arrays, encoded, and what was found in it.
+type Encoded = (Vec<u8>, Vec<u8>, Remarkable);
+
+impl Measurement {
+    /// Writes one view from its images, on the threads of the pool that this is called in.
+    pub fn write_view(&self, view: usize, images: &Images, codes: &LightnessCodes) -> Result<Remarkable> {
+        let mut found = Remarkable::default();
+        for (sy, sx) in self.shards() {
+            let across = self.side / CHUNK_SIDE;
+            let places: Vec<Option<Window>> = (0..across * across)
+                .map(|place| self.chunk_window([sy, sx], [place / across, place % across]))
+                .collect();
+            let encoder =
+                || (Encoder::new(self.codec, self.chunk_shape()), Encoder::new(self.codec, self.code_chunk_shape()));
+            let chunks: Vec<Option<Encoded>> = places
+                .par_iter()
+                .map_init(encoder, |encoders, window| {
+                    window.map(|window| self.encode(encoders, images, codes, window)).transpose()
+                })
+                .collect::<Result<_>>()?;
+            let (mut reflectance, mut luminance) = (Vec::new(), Vec::new());
+            for chunk in chunks {
+                let (samples, codes, remarkable) = chunk.map_or((None, None, None), |(s, c, r)| (Some(s), Some(c), Some(r)));
+                reflectance.push(samples);
+                luminance.push(codes);
+                found += remarkable.unwrap_or_default();
+            }
+            let place = [view as u64, sy, sx, 0, 0];
+            // Luminance last: a view counts as done when it has both.
+            self.store.write_encoded(&self.reflectance, &place, shard::assemble(&reflectance))?;
+            drop(reflectance);
+            self.store.write_encoded(&self.luminance, &place[..4], shard::assemble(&luminance))?;
+        }
+        Ok(found)
+    }
+
+    /// The texels of a chunk, reaching over the border of the plane; `None` if it lies wholly beyond.
+    fn chunk_window(&self, shard: [u64; 2], chunk: [usize; 2]) -> Option<Window> {
+        let [y, x] = [0, 1].map(|axis| shard[axis] as usize * self.side + chunk[axis] * CHUNK_SIDE);
+        let Size { height, width } = self.description.size;
+        (y < height && x < width).then_some(Window { y, x, size: Size::new(CHUNK_SIDE, CHUNK_SIDE) })
+    }
+
+    fn encode(
+        &self,
+        (encoder, code_encoder): &mut (Encoder, Encoder),
+        images: &Images,
+        codes: &LightnessCodes,
+        window: Window,
+    ) -> Result<Encoded> {
+        let samples = images.gather(window);
+        let mut luminance = vec![0; window.size.texels() * self.description.lights.len()];
+        let all = codes.fill(&samples, &mut luminance);
+        let remarkable = self.inside(window, all, &samples, codes);
+        Ok((encoder.encode(gather::bytes(&samples))?, code_encoder.encode(&luminance)?, remarkable))
+    }
+
+    /// What was found in the part of a chunk that lies within the plane.
+    fn inside(
+        &self,
+        window: Window,
+        all: Remarkable,
+        samples: &btfkit_formats::Samples,
+        codes: &LightnessCodes,
+    ) -> Remarkable {
+        let Size { height, width } = self.description.size;
+        let within = Size::new(window.size.height.min(height - window.y), window.size.width.min(width - window.x));
+        if within == window.size || all == Remarkable::default() {
+            return all;
+        }
+        let texel = self.description.texel_samples();
+        let mut found = Remarkable::default();
+        let mut unused = vec![0; within.width * self.description.lights.len()];
+        for row in 0..within.height {
+            let from = row * window.size.width * texel;
+            if let Some(row) = samples.select(std::iter::once(from..from + within.width * texel)) {
+                found += codes.fill(&row, &mut unused);
+            }
+        }
+        found
+    }
+}

@@ -56,33 +56,31 @@ pub(super) struct EntropyCoded {
 
 /// Steps over a scan's data, to its end at the next marker that is no restart marker.
 pub(super) fn entropy_coded(reader: &mut Reader<'_>) -> Result<EntropyCoded> {
-    let mut found = EntropyCoded { bytes: 0, restarts: 0 };
-    loop {
-        let at = reader.position();
-        let rest = reader.rest();
-        let Some(before) = rest.iter().position(|&byte| byte == 0xFF) else {
-            return Err(Error::malformed("the end of the data inside a scan", "an EOI marker").at(at));
-        };
-        reader.take(before)?;
-        found.bytes = found.bytes.saturating_add(u64::try_from(before).unwrap_or(u64::MAX));
-        match rest.get(before.saturating_add(1)) {
+    let start = reader.position();
+    let cut = || Error::malformed("the end of the data inside a scan", "an EOI marker").at(start);
+    let scan = reader.rest();
+    let (mut stuffed, mut restarts) = (0u64, 0u64);
+    for at in memchr::memchr_iter(0xFF, scan) {
+        // Each 0xFF but a marker's own is followed by a byte that is none, so no pair is seen twice.
+        match scan.get(at.saturating_add(1)) {
             // A stuffed zero: the 0xFF is data.
-            Some(0) => {
-                reader.take(2)?;
-                found.bytes = found.bytes.saturating_add(1);
-            }
+            Some(0) => stuffed = stuffed.saturating_add(1),
             Some(&code @ RST0..=RST7) => {
-                if u64::from(code & 7) != found.restarts % 8 {
-                    let expected = format!("RST{}", found.restarts % 8);
-                    return Err(Error::malformed(format!("RST{}", code & 7), expected).at(reader.position()));
+                if u64::from(code & 7) != restarts % 8 {
+                    let expected = format!("RST{}", restarts % 8);
+                    let position = start.saturating_add(at);
+                    return Err(Error::malformed(format!("RST{}", code & 7), expected).at(position));
                 }
-                reader.take(2)?;
-                found.restarts = found.restarts.saturating_add(1);
+                restarts = restarts.saturating_add(1);
             }
-            Some(_) => return Ok(found),
-            None => {
-                return Err(Error::malformed("the end of the data inside a scan", "an EOI marker").at(at));
+            Some(_) => {
+                reader.take(at)?;
+                let all = u64::try_from(at).unwrap_or(u64::MAX);
+                let bytes = all.saturating_sub(stuffed).saturating_sub(restarts.saturating_mul(2));
+                return Ok(EntropyCoded { bytes, restarts });
             }
+            None => return Err(cut()),
         }
     }
+    Err(cut())
 }

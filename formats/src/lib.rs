@@ -46,9 +46,13 @@
     )
 )]
 
+mod angles;
+mod catalogue;
 mod contents;
 mod direction;
+pub mod directions;
 mod error;
+mod file_name;
 pub mod jpeg;
 mod limits;
 pub mod picture;
@@ -57,6 +61,8 @@ mod samples;
 pub mod ubo2003;
 pub mod zip;
 
+pub use angles::Angles;
+pub use catalogue::{Catalogue, CatalogueErrors, Duplicate, Pair};
 pub use contents::{Contents, Images};
 pub use direction::Direction;
 pub use error::{Error, ErrorKind, Result};

@@ -1,6 +1,7 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
+use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
 /// What the name of an image says.
@@ -16,8 +17,8 @@ pub struct ImageName {
 
 /// Reads the name of an image, or `None` if it is not one.
 ///
-/// Only what follows the last `/` or `\` counts. It must end in `.jpg` or `.jpeg` and have each of `tl`, `pl`,
-/// `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
+/// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif, tiff,
+/// hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
 /// be negative). Case, order, separators, and whatever else the name holds, do not matter.
 ///
 /// ```
@@ -30,11 +31,7 @@ pub struct ImageName {
 /// assert_eq!(parse_name("readme.txt"), None);
 /// ```
 pub fn parse_name(path: &str) -> Option<ImageName> {
-    let base = path.rsplit(['/', '\\']).next()?;
-    let (stem, extension) = base.rsplit_once('.')?;
-    if !extension.eq_ignore_ascii_case("jpg") && !extension.eq_ignore_ascii_case("jpeg") {
-        return None;
-    }
+    let stem = base(picture_stem(path)?);
     Some(ImageName {
         number: leading_number(stem),
         light: Angles::new(angle(stem, *b"tl")?, angle(stem, *b"pl")?)?,
@@ -157,6 +154,10 @@ mod tests {
             "tl15__pl420__tv30__pv690.jpeg",
             "wood tl15 pl60 tv30 pv330 rectified.jpg",
             "stl9 tl15 pl60 tv30 pv330.jpg",
+            "CEILING_HDR/tl015 pl060 tv030 pv330.hdr",
+            "tv30.000_pv330.000_tl15.000_pl60.000.EXR",
+            "tl15 pl60 tv30 pv330.png",
+            "tl15 pl60 tv30 pv330.TIFF",
         ] {
             assert_eq!(parse_name(name), Some(expected), "{name:?}");
         }
@@ -180,7 +181,8 @@ mod tests {
             "tl015 pl000 tv000.jpg",
             "tl015 pl000 tv000 pv.jpg",
             "tl015 pl000 tv000 pv000",
-            "tl015 pl000 tv000 pv000.png",
+            "tl015 pl000 tv000 pv000.gif",
+            "__MACOSX/tv000_pv000/._00000 tl000 pl000 tv000 pv000.jpg",
             "tl015 pl000 tv000 pv000.jpg.txt",
             "tl015 pl000 tv000 pv000.jpg/",
             "tl015 pl000/tv000 pv000.jpg",

@@ -1,6 +1,7 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
+use crate::fields::NumberPrefix;
 use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
@@ -53,37 +54,17 @@ fn angle(stem: &str, key: [u8; 2]) -> Option<f64> {
         let before = at.checked_sub(1).and_then(|at| bytes.get(at));
         !before.is_some_and(|byte| byte.is_ascii_alphabetic() || !byte.is_ascii())
     };
+    let number = |text: &str| text.get(..NumberPrefix::of(text)?.all)?.parse().ok();
     let mut numbers = bytes
         .windows(2)
         .enumerate()
         .filter(is_key)
         .filter(starts_word)
-        .filter_map(|(at, _)| number(bytes.get(at.checked_add(2)?..)?));
+        .filter_map(|(at, _)| number(stem.get(at.checked_add(2)?..)?));
     match (numbers.next(), numbers.next()) {
         (Some(number), None) => Some(number),
         _ => None,
     }
-}
-
-/// The decimal number that `bytes` start with: an optional minus sign, digits, and a fraction if any.
-fn number(bytes: &[u8]) -> Option<f64> {
-    let digits_after = |at: usize| {
-        let rest = bytes.get(at..).unwrap_or(&[]);
-        rest.iter().take_while(|byte| byte.is_ascii_digit()).count()
-    };
-    let sign = usize::from(bytes.first() == Some(&b'-'));
-    let whole = digits_after(sign);
-    if whole == 0 {
-        return None;
-    }
-    let mut end = sign.checked_add(whole)?;
-    if bytes.get(end) == Some(&b'.') {
-        let fraction = digits_after(end.checked_add(1)?);
-        if fraction > 0 {
-            end = end.checked_add(1)?.checked_add(fraction)?;
-        }
-    }
-    std::str::from_utf8(bytes.get(..end)?).ok()?.parse().ok()
 }
 
 /// The published path of an image, `tvTTT_pvPPP/NNNNN tlTTT plPPP tvTTT pvPPP.jpg`, where the number is

@@ -60,6 +60,7 @@ pub mod named;
 pub mod picture;
 mod reader;
 mod samples;
+pub mod table;
 pub mod ubo2003;
 pub mod zip;
 

@@ -59,6 +59,7 @@ mod limits;
 pub mod named;
 pub mod picture;
 mod reader;
+pub mod rti;
 mod samples;
 pub mod table;
 pub mod ubo2003;

@@ -215,6 +215,18 @@ fn number(given: &[Angles]) -> (Vec<Angles>, Vec<usize>) {
     (distinct, numbers)
 }
 
+/// The first direction that was there before, or one so near that it counts as the same: both positions, earlier
+/// and later.
+pub(crate) fn repeated_direction(given: &[Angles]) -> Option<(usize, usize)> {
+    let mut first: Vec<Option<usize>> = vec![None; given.len()];
+    number(given).1.into_iter().enumerate().find_map(|(at, number)| {
+        let first = first.get_mut(number)?;
+        let earlier = *first;
+        *first = earlier.or(Some(at));
+        Some((earlier?, at))
+    })
+}
+
 fn near(a: Angles, b: Angles) -> bool {
     if a == b {
         return true;

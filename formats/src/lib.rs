@@ -57,6 +57,7 @@ mod file_name;
 pub mod jpeg;
 mod limits;
 pub mod named;
+pub mod npy;
 pub mod picture;
 mod reader;
 pub mod rti;

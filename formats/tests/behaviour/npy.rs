@@ -149,7 +149,8 @@ fn published_counts_are_named_but_not_assumed() {
         let bytes = [header([1, count, 1, 1, 1], SampleType::U8), vec![0; count as usize]].concat();
         let error = Archive::open(&bytes, Beside::default(), &Limits::default()).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");
-        let list = lists::published(name).unwrap().into_iter().map(|angles| angles.direction()).collect();
+        let list =
+            lists::published(name).unwrap().into_iter().map(btfkit_formats::Angles::direction).collect();
         let archive =
             Archive::open(&bytes, Beside { views: None, lights: Some(list) }, &Limits::default()).unwrap();
         assert_eq!(archive.contents().views, [Direction { theta_rad: 0.0, phi_rad: 0.0 }]);

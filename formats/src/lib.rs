@@ -46,17 +46,28 @@
     )
 )]
 
+mod angles;
+mod catalogue;
 mod contents;
 mod direction;
+pub mod directions;
 mod error;
+mod fields;
+mod file_name;
 pub mod jpeg;
 mod limits;
+pub mod named;
+pub mod npy;
 pub mod picture;
 mod reader;
+pub mod rti;
 mod samples;
+pub mod table;
 pub mod ubo2003;
 pub mod zip;
 
+pub use angles::Angles;
+pub use catalogue::{Catalogue, CatalogueErrors, Duplicate, Pair};
 pub use contents::{Contents, Images};
 pub use direction::Direction;
 pub use error::{Error, ErrorKind, Result};

@@ -11,6 +11,8 @@ mod writer;
 pub use index::{Method, ZipEntry, ZipIndex};
 pub use writer::ZipWriter;
 
+pub(crate) use name::unsafe_reason;
+
 use crate::{Error, ErrorKind};
 
 /// CRC-32 (IEEE 802.3) as zip uses it.

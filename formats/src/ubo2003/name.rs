@@ -1,6 +1,8 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
+use crate::fields::NumberPrefix;
+use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
 /// What the name of an image says.
@@ -16,8 +18,8 @@ pub struct ImageName {
 
 /// Reads the name of an image, or `None` if it is not one.
 ///
-/// Only what follows the last `/` or `\` counts. It must end in `.jpg` or `.jpeg` and have each of `tl`, `pl`,
-/// `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
+/// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif, tiff,
+/// hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
 /// be negative). Case, order, separators, and whatever else the name holds, do not matter.
 ///
 /// ```
@@ -30,11 +32,7 @@ pub struct ImageName {
 /// assert_eq!(parse_name("readme.txt"), None);
 /// ```
 pub fn parse_name(path: &str) -> Option<ImageName> {
-    let base = path.rsplit(['/', '\\']).next()?;
-    let (stem, extension) = base.rsplit_once('.')?;
-    if !extension.eq_ignore_ascii_case("jpg") && !extension.eq_ignore_ascii_case("jpeg") {
-        return None;
-    }
+    let stem = base(picture_stem(path)?);
     Some(ImageName {
         number: leading_number(stem),
         light: Angles::new(angle(stem, *b"tl")?, angle(stem, *b"pl")?)?,
@@ -56,37 +54,17 @@ fn angle(stem: &str, key: [u8; 2]) -> Option<f64> {
         let before = at.checked_sub(1).and_then(|at| bytes.get(at));
         !before.is_some_and(|byte| byte.is_ascii_alphabetic() || !byte.is_ascii())
     };
+    let number = |text: &str| text.get(..NumberPrefix::of(text)?.all)?.parse().ok();
     let mut numbers = bytes
         .windows(2)
         .enumerate()
         .filter(is_key)
         .filter(starts_word)
-        .filter_map(|(at, _)| number(bytes.get(at.checked_add(2)?..)?));
+        .filter_map(|(at, _)| number(stem.get(at.checked_add(2)?..)?));
     match (numbers.next(), numbers.next()) {
         (Some(number), None) => Some(number),
         _ => None,
     }
-}
-
-/// The decimal number that `bytes` start with: an optional minus sign, digits, and a fraction if any.
-fn number(bytes: &[u8]) -> Option<f64> {
-    let digits_after = |at: usize| {
-        let rest = bytes.get(at..).unwrap_or(&[]);
-        rest.iter().take_while(|byte| byte.is_ascii_digit()).count()
-    };
-    let sign = usize::from(bytes.first() == Some(&b'-'));
-    let whole = digits_after(sign);
-    if whole == 0 {
-        return None;
-    }
-    let mut end = sign.checked_add(whole)?;
-    if bytes.get(end) == Some(&b'.') {
-        let fraction = digits_after(end.checked_add(1)?);
-        if fraction > 0 {
-            end = end.checked_add(1)?.checked_add(fraction)?;
-        }
-    }
-    std::str::from_utf8(bytes.get(..end)?).ok()?.parse().ok()
 }
 
 /// The published path of an image, `tvTTT_pvPPP/NNNNN tlTTT plPPP tvTTT pvPPP.jpg`, where the number is
@@ -157,6 +135,10 @@ mod tests {
             "tl15__pl420__tv30__pv690.jpeg",
             "wood tl15 pl60 tv30 pv330 rectified.jpg",
             "stl9 tl15 pl60 tv30 pv330.jpg",
+            "CEILING_HDR/tl015 pl060 tv030 pv330.hdr",
+            "tv30.000_pv330.000_tl15.000_pl60.000.EXR",
+            "tl15 pl60 tv30 pv330.png",
+            "tl15 pl60 tv30 pv330.TIFF",
         ] {
             assert_eq!(parse_name(name), Some(expected), "{name:?}");
         }
@@ -180,7 +162,8 @@ mod tests {
             "tl015 pl000 tv000.jpg",
             "tl015 pl000 tv000 pv.jpg",
             "tl015 pl000 tv000 pv000",
-            "tl015 pl000 tv000 pv000.png",
+            "tl015 pl000 tv000 pv000.gif",
+            "__MACOSX/tv000_pv000/._00000 tl000 pl000 tv000 pv000.jpg",
             "tl015 pl000 tv000 pv000.jpg.txt",
             "tl015 pl000 tv000 pv000.jpg/",
             "tl015 pl000/tv000 pv000.jpg",

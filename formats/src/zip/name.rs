@@ -3,7 +3,7 @@
 /// The reason why `name` must not be read from an archive, if there is one.
 ///
 /// A backslash counts as a separator, as it is one where some archives are made or unpacked.
-pub(super) fn unsafe_reason(name: &str) -> Option<&'static str> {
+pub(crate) fn unsafe_reason(name: &str) -> Option<&'static str> {
     let mut parts = name.split(['/', '\\']);
     if name.is_empty() {
         Some("an empty name")

@@ -1,6 +1,7 @@
 //! A set is complete or the report says all that is wrong with it.
 
-use btfkit_formats::ubo2003::{Catalogue, CatalogueErrors, directions_81, write_name};
+use btfkit_formats::ubo2003::{directions_81, write_name};
+use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Pair};
 
 /// The names of a published set with these numbers of views and lights.
 fn names(views: usize, lights: usize) -> Vec<String> {
@@ -116,4 +117,67 @@ fn a_few_names_cannot_ask_for_a_huge_list() {
     let errors = catalogue(&names).unwrap_err();
     assert_eq!(errors.missing_count, 3000 * 3000 - 3000);
     assert_eq!(errors.missing.len(), 65_536);
+}
+
+#[test]
+fn one_pair_in_two_formats_is_a_duplicate() {
+    let mut names = names(2, 2);
+    names.push(names[1].replace(".jpg", ".hdr"));
+    let errors = *catalogue(&names).unwrap_err();
+    assert_eq!((errors.missing_count, errors.duplicates.len()), (0, 1));
+    assert_eq!(errors.duplicates[0].names, [&names[1], &names[4]].map(Clone::clone));
+}
+
+#[test]
+fn a_set_may_be_spread_over_containers() {
+    let names = names(3, 5);
+    let of_view = |view: usize| names.iter().skip(view).step_by(3);
+    let views = [of_view(2), of_view(0), of_view(1)];
+    let chained: Vec<&str> = views.into_iter().flatten().map(String::as_str).collect();
+    let found = Catalogue::from_names(chained.iter().copied()).unwrap();
+    for (view, first) in [(0, 5), (1, 10), (2, 0)] {
+        let positions: Vec<_> = (0..5).map(|light| found.image(view, light).unwrap()).collect();
+        assert_eq!(positions, (first..first + 5).collect::<Vec<_>>());
+    }
+}
+
+/// A set of one view from its lights.
+fn of_lights(lights: &[(f64, f64)]) -> Result<Catalogue, Box<CatalogueErrors>> {
+    let pair =
+        |&(theta, phi): &(f64, f64)| Pair { view: Angles::FRONTAL, light: Angles::new(theta, phi).unwrap() };
+    Catalogue::from_pairs(lights.iter().map(|light| ("some name", Some(pair(light)))))
+}
+
+#[test]
+fn directions_that_differ_by_rounding_are_one() {
+    const ROUNDING_DEG: f64 = 4e-5;
+    for (theta, phi) in [(15.0, 60.0), (75.0, 0.0), (90.0, 360.0), (1.0, 180.0)] {
+        for (near_theta, near_phi) in
+            [(theta - ROUNDING_DEG, phi), (theta, phi - ROUNDING_DEG), (theta, phi + ROUNDING_DEG)]
+        {
+            let errors = of_lights(&[(theta, phi), (near_theta, near_phi)]).unwrap_err();
+            assert_eq!(
+                (errors.lights, errors.duplicates.len()),
+                (1, 1),
+                "{theta} {phi} {near_theta} {near_phi}"
+            );
+        }
+        let apart = of_lights(&[(theta, phi), (theta - 2.0 * ROUNDING_DEG, phi)]).unwrap();
+        assert_eq!(apart.lights().len(), 2);
+    }
+    // At the pole every phi is one direction, and nearly so beside it.
+    assert_eq!(of_lights(&[(0.0, 0.0), (ROUNDING_DEG, 77.0), (0.0, 190.0)]).unwrap_err().lights, 1);
+    // A large step of phi is a small one near the pole.
+    assert_eq!(of_lights(&[(1e-3, 60.0), (1e-3, 60.5)]).unwrap_err().lights, 1);
+    assert_eq!(of_lights(&[(1.0, 60.0), (1.0, 60.5)]).unwrap().lights().len(), 2);
+}
+
+#[test]
+fn noise_of_theta_does_not_disturb_the_order_of_a_ring() {
+    let found = of_lights(&[(30.0, 0.0), (15.00002, 10.0), (15.0, 200.0), (15.00001, 100.0)]).unwrap();
+    let phis: Vec<f64> = found.lights().iter().map(|light| light.phi_deg()).collect();
+    assert_eq!(phis, [10.0, 100.0, 200.0, 0.0]);
+    assert_eq!(found.lights()[0].theta_deg(), 15.00002, "what was given is kept");
+    let positions: Vec<_> = (0..4).map(|light| found.image(0, light).unwrap()).collect();
+    assert_eq!(positions, [1, 3, 2, 0]);
 }

@@ -9,7 +9,10 @@
 mod catalogue;
 mod damage;
 mod jpeg;
+mod lists;
 mod measured_files;
+mod measured_lists;
+mod npy;
 mod support;
 mod zip_reading;
 mod zip_writing;

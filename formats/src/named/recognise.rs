@@ -1,0 +1,286 @@
+//! Finding a pattern by the labels that stand before the numbers in names.
+
+use std::collections::HashMap;
+
+use super::Pattern;
+use crate::fields::{Component, Field, NumberPrefix, Side};
+use crate::file_name::{base, picture_stem};
+use crate::{Error, ErrorKind, Result};
+
+/// Words that say what a number is, before the word of its side.
+const COMPONENTS: [(&str, Component); 7] = [
+    ("theta", Component::Theta),
+    ("t", Component::Theta),
+    ("phi", Component::Phi),
+    ("p", Component::Phi),
+    ("x", Component::X),
+    ("y", Component::Y),
+    ("z", Component::Z),
+];
+
+/// Words of the light (or what comes in) and of the view (or what goes out).
+const SIDES: [(&str, Side); 6] = [
+    ("light", Side::Light),
+    ("l", Side::Light),
+    ("i", Side::Light),
+    ("view", Side::View),
+    ("v", Side::View),
+    ("o", Side::View),
+];
+
+/// What may stand between a label and its number, or between two angles of one label.
+const SEPARATORS: [char; 5] = ['_', '-', ' ', '=', ','];
+
+/// What one label is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Labels {
+    /// Each number has its own: `tl15_pl30`.
+    Numbers,
+    /// Theta and phi share one: `l15_30`.
+    Directions,
+}
+
+/// Finds the pattern of a folder's pictures; names that are no pictures do not count.
+///
+/// Two ways of labelling are known, in any order of the labels and without regard to case. A label for each number: `tl` or
+/// `theta_l`, `pl` or `phi_l`, or `x_l`, `y_l`, `z_l`, with or without the underscore, where the side `l`, `i` or
+/// `light` is the light and `v`, `o` or `view` the view: `tv15_pv30_tl45_pl60`,
+/// `thetaI=15 phiI=30`, `ti_15_pi_30_to_0_po_0`. Or a label for theta and phi
+/// together: `l15_30_v45_60`. Angles are in degrees. The label may be in the file's name or, for one side,
+/// in that of its folder. Numbers without a label become `{n}`, the rest of the first name stays as it is.
+///
+/// ```
+/// use btfkit_formats::named::recognise;
+///
+/// let pattern = recognise(["wool 7 L15_0 V0_0.png", "wool 7 L15_90 V0_0.png", "notes.txt"]).unwrap();
+/// assert_eq!(pattern.to_string(), "wool {n} L{theta_i}_{phi_i} V{theta_v}_{phi_v}");
+/// assert!(recognise(["15_30_45_60.png"]).is_err(), "which is theta, which is the light?");
+/// ```
+///
+/// # Errors
+/// [`ErrorKind::Unsupported`], with the names: no picture; no labels, or not those of a whole light (and view); a
+/// picture that does not fit the pattern of the first; two pictures of the same directions.
+pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern> {
+    let pictures: Vec<&str> = names.into_iter().filter(|name| picture_stem(name).is_some()).collect();
+    let unsupported = |found: String, expected| Error::new(ErrorKind::Unsupported, found, expected);
+    let Some(&first) = pictures.first() else {
+        return Err(unsupported("no picture".to_owned(), "pictures with angles in their names"));
+    };
+    let pattern = pattern_of(first).ok_or_else(|| {
+        unsupported(
+            format!("the name {first:?}, whose numbers carry no labels of a whole direction"),
+            "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0`, or a pattern that says what is what",
+        )
+    })?;
+    let mut seen = HashMap::new();
+    for &name in &pictures {
+        let Some(pair) = pattern.angles(name) else {
+            let found =
+                format!("the name {name:?}, which does not fit the pattern {:?}", pattern.to_string());
+            return Err(unsupported(found, "all pictures named alike, or a pattern for those that count"));
+        };
+        let bits = [pair.view, pair.light].map(|a| (a.theta_deg().to_bits(), a.phi_deg().to_bits()));
+        if let Some(earlier) = seen.insert(bits, name) {
+            let found = format!("{earlier:?} and {name:?}, both {pair}");
+            return Err(unsupported(found, "one picture for each pair of directions, or a pattern"));
+        }
+    }
+    Ok(pattern)
+}
+
+/// The pattern that a picture's labels give.
+fn pattern_of(name: &str) -> Option<Pattern> {
+    [Labels::Numbers, Labels::Directions].into_iter().find_map(|labels| labels.pattern_of(name))
+}
+
+impl Labels {
+    /// The pattern of the name alone if that has light and view, else with its folder.
+    fn pattern_of(self, name: &str) -> Option<Pattern> {
+        let stem = picture_stem(name)?;
+        let file = self.fields_of(base(stem))?;
+        let parse = |text: &str| Pattern::parse(text).ok().filter(|pattern| pattern.angles(name).is_some());
+        let alone = parse(&file);
+        if alone.as_ref().is_some_and(Pattern::has_view) {
+            return alone;
+        }
+        let folder = stem.rsplit_once(['/', '\\']).and_then(|(above, _)| self.fields_of(base(above)));
+        let both = folder.and_then(|folder| parse(&format!("{folder}/{file}")));
+        both.filter(Pattern::has_view).or(alone)
+    }
+
+    /// One part of a path with fields for its numbers; `None` if it has braces, which a pattern cannot have.
+    fn fields_of(self, part: &str) -> Option<String> {
+        if part.contains(['{', '}']) {
+            return None;
+        }
+        let dashes_separate = dashes_separate(part);
+        let mut pattern = String::new();
+        let mut left = part;
+        while let Some((mut before, number)) = split_at_digit(left) {
+            let own = number_label(before).zip(NumberPrefix::of(number));
+            let shared = direction_label(before).and_then(|side| two_angles(side, number));
+            let found = match (self, own, shared) {
+                (_, None, None) => None,
+                (Labels::Numbers, Some((field, prefix)), _) => {
+                    let signed =
+                        before.strip_suffix('-').filter(|rest| !dashes_separate || rest.ends_with('-'));
+                    before = signed.filter(|_| field.may_be_negative()).unwrap_or(before);
+                    Some((braced(field), prefix.all))
+                }
+                (Labels::Directions, None, Some((fields, length)))
+                    if !another_number(number.get(length..)?) =>
+                {
+                    Some((fields, length))
+                }
+                // Both ways of labelling, or a label with three numbers: what is meant cannot be known.
+                _ => return None,
+            };
+            let digits = || number.len().saturating_sub(after_digits(number).len());
+            let (fields, length) = found.unwrap_or_else(|| ("{n}".to_owned(), digits()));
+            pattern.push_str(before);
+            pattern.push_str(&fields);
+            left = number.get(length..)?;
+        }
+        pattern.push_str(left);
+        Some(pattern)
+    }
+}
+
+/// What stands before the first digit, and the rest.
+fn split_at_digit(text: &str) -> Option<(&str, &str)> {
+    text.split_at_checked(text.find(|c: char| c.is_ascii_digit())?)
+}
+
+fn after_digits(text: &str) -> &str {
+    text.trim_start_matches(|c: char| c.is_ascii_digit())
+}
+
+/// Whether a dash before a number is no sign: so it is where one stands before theta or z, which are never
+/// negative.
+fn dashes_separate(part: &str) -> bool {
+    let mut left = part;
+    while let Some((before, number)) = split_at_digit(left) {
+        if before.ends_with('-') && number_label(before).is_some_and(|field| !field.may_be_negative()) {
+            return true;
+        }
+        left = after_digits(number);
+    }
+    false
+}
+
+/// The field whose label a text ends with, separators aside.
+fn number_label(before: &str) -> Option<Field> {
+    COMPONENTS.iter().find_map(|&(word, component)| {
+        SIDES.iter().find_map(|&(of, side)| {
+            let labels = [format!("{word}{of}"), format!("{word}_{of}")];
+            labels.iter().any(|label| ends_with_word(before, label)).then_some(Field::new(side, component))
+        })
+    })
+}
+
+/// The side whose label a text ends with, separators aside.
+fn direction_label(before: &str) -> Option<Side> {
+    SIDES.iter().find_map(|&(word, side)| ends_with_word(before, word).then_some(side))
+}
+
+/// Whether a text ends with this word, in lower case, and nothing but separators behind it and no letter before it.
+fn ends_with_word(text: &str, word: &str) -> bool {
+    let text = text.trim_end_matches(SEPARATORS);
+    let start = text.len().checked_sub(word.len());
+    start.and_then(|start| text.split_at_checked(start)).is_some_and(|(before, found)| {
+        found.eq_ignore_ascii_case(word) && !before.ends_with(char::is_alphabetic)
+    })
+}
+
+/// Whether nothing but separators stands before the next number.
+fn another_number(text: &str) -> bool {
+    text.trim_start_matches(SEPARATORS).starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// Fields for theta and phi, one separator between them, and their length in the text.
+fn two_angles(side: Side, text: &str) -> Option<(String, usize)> {
+    let theta = NumberPrefix::of(text)?.all;
+    let rest = text.get(theta..)?;
+    let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
+    let phi = rest.strip_prefix(separator)?;
+    let after = phi.get(NumberPrefix::of(phi)?.all..)?;
+    let [theta, phi] =
+        [Component::Theta, Component::Phi].map(|component| braced(Field::new(side, component)));
+    Some((format!("{theta}{separator}{phi}"), text.len().checked_sub(after.len())?))
+}
+
+fn braced(field: Field) -> String {
+    format!("{{{}}}", field.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recognised(names: &[&str]) -> String {
+        recognise(names.iter().copied()).unwrap().to_string()
+    }
+
+    #[test]
+    fn labels_in_any_order_and_spelling() {
+        for (name, pattern) in [
+            ("tv15_pv30_tl45_pl60.png", "tv{theta_v}_pv{phi_v}_tl{theta_i}_pl{phi_i}"),
+            ("00081 TL015 PL000 TV000 PV000.jpg", "{n} TL{theta_i} PL{phi_i} TV{theta_v} PV{phi_v}"),
+            ("wool07_ti15.5po30pi-45to0.exr", "wool{n}_ti{theta_i}po{phi_v}pi{phi_i}to{theta_v}"),
+            ("theta_i_15_phi_i_30.tif", "theta_i_{theta_i}_phi_i_{phi_i}"),
+            (
+                "thetaI=15 phiI=30 thetaO=0 phiO=0.tif",
+                "thetaI={theta_i} phiI={phi_i} thetaO={theta_v} phiO={phi_v}",
+            ),
+            ("theta_l-15-phi_l-30.png", "theta_l-{theta_i}-phi_l-{phi_i}"),
+            ("tl-15_pl-30.png", "tl-{theta_i}_pl-{phi_i}"),
+            ("pl--30_tl-15.png", "pl-{phi_i}_tl-{theta_i}"),
+            ("tl15_pl-30.png", "tl{theta_i}_pl{phi_i}"),
+            ("x_l-0.5_y_l0.1_z_l0.8.hdr", "x_l{x_i}_y_l{y_i}_z_l{z_i}"),
+            ("L15_30_V0_0_007.png", ""),
+            ("007_L15.5_30_V0_0.png", "{n}_L{theta_i}_{phi_i}_V{theta_v}_{phi_v}"),
+            ("a/b7 light-15-30.png", "b{n} light-{theta_i}-{phi_i}"),
+            ("m/tv10_pv20/tl30_pl40.png", "tv{theta_v}_pv{phi_v}/tl{theta_i}_pl{phi_i}"),
+            ("m/view_10_20/light_30_40.png", "view_{theta_v}_{phi_v}/light_{theta_i}_{phi_i}"),
+            ("wool_v2_tl15_pl30.png", "wool_v{n}_tl{theta_i}_pl{phi_i}"),
+            ("v2_3_tl15_pl30.png", ""),
+            ("tl15_pl30_v45_0.png", ""),
+            ("theta15_phi30.png", ""),
+            ("15_30_45_60.png", ""),
+            ("l1_v2.png", ""),
+            ("tl15.png", ""),
+            ("tv15_pv30.png", ""),
+            ("tl15_pl30_theta_i20.png", ""),
+            ("tl95_pl30.png", ""),
+            ("{tl15_pl30}.png", ""),
+        ] {
+            let found = recognise([name]).map(|pattern| pattern.to_string()).unwrap_or_default();
+            assert_eq!(found, pattern, "{name}");
+        }
+    }
+
+    #[test]
+    fn all_pictures_must_fit() {
+        let names = ["tl0_pl0.png", "tl15_pl30.png", "readme.txt", "tl15_pl-60.5.png"];
+        assert_eq!(recognised(&names), "tl{theta_i}_pl{phi_i}");
+        let error = recognise(names.into_iter().chain(["mask.png"])).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported);
+        assert!(error.to_string().contains("mask.png"), "{error}");
+    }
+
+    #[test]
+    fn pictures_of_one_pair_are_ambiguous() {
+        let error = recognise(["a1 tl15_pl30.png", "a2 tl15_pl390.png"]).unwrap_err();
+        assert!(
+            error.to_string().contains("a1 tl15_pl30.png") && error.to_string().contains("a2 "),
+            "{error}"
+        );
+        assert!(recognise(["a1 tl15_pl30.png", "a2 tl15_pl31.png"]).is_ok());
+    }
+
+    #[test]
+    fn no_picture_is_no_pattern() {
+        assert!(recognise([]).is_err());
+        assert!(recognise(["tl15_pl30.txt"]).is_err());
+    }
+}

@@ -1,0 +1,219 @@
+//! Light position lists, `.lp`.
+
+use std::borrow::Cow;
+
+use crate::file_name::{inside_folder, repeated};
+use crate::{Angles, Error, ErrorKind, Limits, Result};
+
+/// The lights of a fixed view, in the list's order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightList {
+    /// One for each photograph: all with a file, or all without, and no file twice.
+    pub lamps: Vec<Lamp>,
+    /// What is odd but does no harm, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// One photograph's light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lamp {
+    /// Path inside the list's folder, parts separated by `/`; `None` in lists without names, whose lights
+    /// belong to the sorted pictures of the folder.
+    pub file: Option<String>,
+    /// Direction to the light.
+    pub light: Angles,
+    /// Line in the list, the first is 1.
+    pub line: usize,
+}
+
+/// Reads a light position list.
+///
+/// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y z,
+/// the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by spaces or tabs, lines end in LF, CRLF or CR.
+/// A count that is wrong or not there is a warning. A second variant has no names. Of a name that is absolute,
+/// has a drive or climbs by `..` (a list from another machine) the last part counts, so a list never reaches
+/// out of its folder.
+///
+/// # Errors
+/// [`ErrorKind::Malformed`], with the line: no light at all, a line that is none, a vector of no length or into the
+/// surface, names on some lines only, no usable name, a name twice. [`ErrorKind::Limit`]: more lights than
+/// [`Limits::max_directions`].
+pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut count = None;
+    let mut lamps: Vec<Lamp> = Vec::new();
+    for (number, line) in lines(bytes) {
+        let text = String::from_utf8_lossy(line);
+        let text = text.trim();
+        if text.is_empty() {
+            continue;
+        }
+        if lamps.is_empty() && count.is_none() && text.bytes().all(|byte| byte.is_ascii_digit()) {
+            count = Some(text.to_owned());
+            continue;
+        }
+        if u64::try_from(lamps.len()).unwrap_or(u64::MAX) >= limits.max_directions {
+            let found = format!("more than {} lights", limits.max_directions);
+            return Err(Error::new(ErrorKind::Limit, found, "a list within the limit of directions"));
+        }
+        let lamp = lamp(text, number)?;
+        if let Some(first) = lamps.first()
+            && first.file.is_some() != lamp.file.is_some()
+        {
+            let has = |lamp: &Lamp| if lamp.file.is_some() { "with" } else { "without" };
+            let found =
+                format!("line {number} {} a name, line {} {} one", has(&lamp), first.line, has(first));
+            return Err(Error::malformed(found, "a name on every line, or on none"));
+        }
+        lamps.push(lamp);
+    }
+    if lamps.is_empty() {
+        return Err(Error::malformed("a list of no lights", "a file name and x y z on each line"));
+    }
+    let named: Vec<(usize, &str)> =
+        lamps.iter().filter_map(|lamp| Some((lamp.line, lamp.file.as_deref()?))).collect();
+    if let Some((first, again)) = repeated(named.iter().map(|&(_, file)| file))
+        && let (Some((first, file)), Some((again, _))) = (named.get(first), named.get(again))
+    {
+        let found = format!("line {again}: {file:?} again, which is in line {first}");
+        return Err(Error::malformed(found, "every file once"));
+    }
+    let warnings = warning(count.as_deref(), lamps.len()).into_iter().collect();
+    Ok(LightList { lamps, warnings })
+}
+
+/// Numbered lines without their ends; a CRLF makes an empty line more, which does not count.
+fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let mut number = 0usize;
+    bytes.split_inclusive(|byte| matches!(byte, b'\n' | b'\r')).scan(b'\n', move |ended_by, line| {
+        if line != b"\n" || *ended_by != b'\r' {
+            number = number.saturating_add(1);
+        }
+        *ended_by = line.last().copied().unwrap_or_default();
+        Some((number, line))
+    })
+}
+
+/// Reads a line that is not blank.
+fn lamp(text: &str, line: usize) -> Result<Lamp> {
+    let wrong = |found: String, expected: Cow<'static, str>| {
+        Err(Error::malformed(format!("line {line}: {found}"), expected))
+    };
+    let mut name = text;
+    let mut vector = [0.0; 3];
+    for component in vector.iter_mut().rev() {
+        let number = name.rsplit(char::is_whitespace).next().unwrap_or(name);
+        let Ok(value) = number.parse::<f64>() else {
+            return wrong(
+                format!("{number:?} in {text:?}"),
+                "a file name (or none) and three numbers x y z".into(),
+            );
+        };
+        *component = value;
+        name = name.strip_suffix(number).unwrap_or_default().trim_end();
+    }
+    let light = match Angles::from_vector(vector) {
+        Ok(light) => light,
+        Err(expected) => return wrong(format!("the light {vector:?}"), expected.into()),
+    };
+    if name.is_empty() {
+        return Ok(Lamp { file: None, light, line });
+    }
+    // Names in another encoding than UTF-8 are of no use, but their folders do not matter.
+    match inside_folder(name).filter(|file| !file.contains(char::REPLACEMENT_CHARACTER)) {
+        Some(file) => Ok(Lamp { file: Some(file), light, line }),
+        None => {
+            wrong(format!("the name {name:?}"), "the name of a file in the list's folder, as UTF-8".into())
+        }
+    }
+}
+
+fn warning(count: Option<&str>, lights: usize) -> Option<String> {
+    match count {
+        None => Some(format!("the list does not begin with its number of lights; it has {lights}")),
+        Some(count) if count.parse() == Ok(lights) => None,
+        Some(count) => Some(format!("the list says that it has {count} lights, it has {lights}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn list(text: &str) -> LightList {
+        read_lp(text.as_bytes(), &Limits::default()).unwrap()
+    }
+
+    fn angles(theta: f64, phi: f64) -> Angles {
+        Angles::new(theta, phi).unwrap()
+    }
+
+    #[test]
+    fn names_with_spaces_tabs_and_any_line_end() {
+        let text = "2\n\ta file 1.jpg\t0 -5e2\t500\n  C:\\my scans\\b 2.JPG 0.0 0 +.5 \n\n";
+        for end in ["\n", "\r\n", "\r"] {
+            let list = list(&text.replace('\n', end));
+            assert_eq!(list.warnings, [""; 0]);
+            let expected = [("a file 1.jpg", angles(45.0, 270.0), 2), ("b 2.JPG", angles(0.0, 0.0), 3)];
+            let expected =
+                expected.map(|(file, light, line)| Lamp { file: Some(file.to_owned()), light, line });
+            assert_eq!(list.lamps, expected, "{end:?}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_or_missing_count_is_a_warning() {
+        assert_eq!(list("7\na.png 0 0 1\n").warnings.len(), 1);
+        assert!(list("7\na.png 0 0 1\n").warnings[0].contains("says that it has 7 lights, it has 1"));
+        assert!(list("99999999999999999999999\na.png 0 0 1\n").warnings[0].contains("it has 1"));
+        assert!(list("\u{feff}a.png 0 0 1\nb.png 0 1 1").warnings[0].contains("it has 2"));
+        assert!(list("\u{feff}2\na.png 0 0 1\nb.png 0 1 1").warnings.is_empty());
+    }
+
+    #[test]
+    fn lists_without_names() {
+        let list = list("0 0 1\r\n1 0 1\r\n");
+        assert!(list.lamps.iter().all(|lamp| lamp.file.is_none()));
+        assert_eq!(list.lamps[1].light, angles(45.0, 0.0));
+        assert_eq!(list.warnings.len(), 1);
+    }
+
+    #[test]
+    fn folders_of_unknown_encoding_do_not_matter() {
+        let limits = Limits::default();
+        let list = read_lp(b"1\n/home/j\xfcrgen/a.png 0 0 1", &limits).unwrap();
+        assert_eq!(list.lamps[0].file.as_deref(), Some("a.png"));
+        assert!(read_lp(b"1\nj\xfcrgen.png 0 0 1", &limits).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[test]
+    fn errors_name_the_line() {
+        for (text, parts) in [
+            ("", &["no lights"][..]),
+            ("12\n", &["no lights"]),
+            ("1\na.png 0 1\n", &["line 2", "\"a.png\"", "x y z"]),
+            ("1\na.png 0 1 x\n", &["line 2", "\"x\""]),
+            ("1\na.png 0 0 0\n", &["line 2", "[0.0, 0.0, 0.0]", "long enough"]),
+            ("1\na.png 1 0 -0.1\n", &["line 2", "[1.0, 0.0, -0.1]", "z >= 0"]),
+            ("1\na.png nan 0 1\n", &["line 2", "NaN", "finite"]),
+            ("2\na.png 0 0 1\n1 0 1\n", &["line 3 without a name", "line 2 with one"]),
+            ("2\na.png 0 0 1\n3\n", &["line 3", "\"3\""]),
+            ("1\n/ 0 0 1\n", &["line 2", "\"/\""]),
+            ("2\r\na.png 0 0 1\r\nx/../a.png 1 0 1\r\n", &["line 3", "\"a.png\" again", "line 2"]),
+        ] {
+            let error = read_lp(text.as_bytes(), &Limits::default()).unwrap_err();
+            assert_eq!(error.kind(), ErrorKind::Malformed);
+            for part in parts {
+                assert!(error.to_string().contains(part), "{text:?}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn lights_are_limited() {
+        let limits = Limits { max_directions: 1, ..Limits::default() };
+        assert!(read_lp(b"4000000000\na 0 0 1\n", &limits).is_ok());
+        let error = read_lp(b"2\na 0 0 1\nb 0 1 1\n", &limits).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Limit);
+    }
+}

@@ -45,7 +45,8 @@ fn components(reader: &mut Reader<'_>, len: usize, line: &mut Vec<[u8; 4]>) -> R
                 left.by_ref().take(count).for_each(|target| *target = value);
             } else {
                 let values = reader.take(count)?;
-                left.by_ref().zip(values).for_each(|(target, &value)| *target = value);
+                // The values first: the end of these must not use up a place.
+                values.iter().zip(left.by_ref()).for_each(|(&value, target)| *target = value);
             }
         }
     }

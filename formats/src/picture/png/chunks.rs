@@ -190,7 +190,10 @@ impl Walked {
         let inflated =
             std::io::copy(&mut (&mut inflate).take(expected.saturating_add(1)), &mut std::io::sink());
         let used = inflate.total_in();
-        let stored = self.data.iter().fold(0u64, |sum, range| sum.saturating_add(range.len() as u64));
+        let stored = self
+            .data
+            .iter()
+            .fold(0u64, |sum, range| sum.saturating_add(u64::try_from(range.len()).unwrap_or(u64::MAX)));
         let wanted = format!("{expected} bytes for {} x {} pixels", self.image.width, self.image.height);
         match inflated {
             Err(e) => Err(Error::malformed(format!("pixel data that do not inflate: {e}"), wanted)),

@@ -120,6 +120,10 @@ impl<'a> Directory<'a> {
         Ok(Directory { bytes, start, entries, at })
     }
 
+    pub(super) fn little_endian(&self) -> bool {
+        self.start.little_endian
+    }
+
     /// The unsigned integers of a tag, if there is one.
     pub(super) fn list(&self, tag: u16) -> Result<Option<Vec<u64>>> {
         let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };

@@ -5,14 +5,64 @@ use crate::picture::grey_or_rgb;
 use crate::picture::size::{Size, unsupported};
 use crate::{Error, Limits, Result, SampleType};
 
-/// Values of the Compression tag, by the bytes that one byte may become at most.
-const COMPRESSIONS: [(u64, u64); 5] = [
-    (1, 1),        // none
-    (5, 2048),     // LZW: codes of 9 to 12 bits for strings that grow by a byte a code, 4096 of them
-    (8, 1032),     // deflate
-    (32946, 1032), // deflate, old number
-    (32773, 64),   // PackBits: two bytes for 128
-];
+/// How the bytes of a strip or tile are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Compression {
+    None,
+    Lzw,
+    Deflate,
+    PackBits,
+}
+
+impl Compression {
+    fn of(number: u64) -> Option<Compression> {
+        match number {
+            1 => Some(Compression::None),
+            5 => Some(Compression::Lzw),
+            8 | 32946 => Some(Compression::Deflate),
+            32773 => Some(Compression::PackBits),
+            _ => None,
+        }
+    }
+
+    /// What one byte may become at most.
+    fn expansion(self) -> u64 {
+        match self {
+            Compression::None => 1,
+            // Codes of 9 to 12 bits for strings that grow by a byte a code, 4096 of them.
+            Compression::Lzw => 2048,
+            Compression::Deflate => 1032,
+            // Two bytes for 128.
+            Compression::PackBits => 64,
+        }
+    }
+}
+
+/// What is stored instead of the samples of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Predictor {
+    None,
+    /// Differences to the pixel at the left.
+    Horizontal,
+    /// The bytes of floats, most significant first of all, then differences.
+    FloatingPoint,
+}
+
+/// A strip or a tile.
+pub(super) struct Chunk {
+    pub(super) number: usize,
+    /// In the file.
+    pub(super) offset: u64,
+    pub(super) len: u64,
+    /// The channel that it holds, if channels are stored apart; else 0.
+    pub(super) plane: u64,
+    /// Of its first pixel.
+    pub(super) x: u64,
+    pub(super) y: u64,
+    /// Of a tile also the pixels beyond the picture.
+    pub(super) width: u64,
+    pub(super) rows: u64,
+}
 
 pub(super) struct Layout {
     /// All channels of the file, alpha too.
@@ -20,9 +70,10 @@ pub(super) struct Layout {
     pub(super) sample_type: SampleType,
     pub(super) alpha: bool,
     pub(super) planar: bool,
+    pub(super) little_endian: bool,
+    pub(super) compression: Compression,
+    pub(super) predictor: Predictor,
     rgb: bool,
-    compression: u64,
-    expansion: u64,
     chunks: Chunks,
     /// Of the strips or tiles: offset and length.
     places: Vec<(u64, u64)>,
@@ -44,23 +95,21 @@ impl Layout {
         let sample_type = sample_type(&directory)?;
         let size = Size::within(dimensions, stored, sample_type, at, limits)?;
 
-        let compression = directory.number(tag::COMPRESSION, Some(1))?;
-        let Some(&(_, expansion)) = COMPRESSIONS.iter().find(|(number, _)| *number == compression) else {
-            return of(
-                format!("compression {compression}"),
-                "1 (none), 5 (LZW), 8 (deflate) or 32773 (PackBits)",
-            );
+        let number = directory.number(tag::COMPRESSION, Some(1))?;
+        let Some(compression) = Compression::of(number) else {
+            return of(format!("compression {number}"), "1 (none), 5 (LZW), 8 (deflate) or 32773 (PackBits)");
         };
         let float = matches!(sample_type, SampleType::F16 | SampleType::F32);
-        match directory.number(tag::PREDICTOR, Some(1))? {
-            1 => {}
-            2 if !matches!(compression, 1 | 32773) => {}
-            3 if float && !matches!(compression, 1 | 32773) => {}
+        let may_predict = matches!(compression, Compression::Lzw | Compression::Deflate);
+        let predictor = match directory.number(tag::PREDICTOR, Some(1))? {
+            1 => Predictor::None,
+            2 if may_predict => Predictor::Horizontal,
+            3 if may_predict && float => Predictor::FloatingPoint,
             other => {
-                let found = format!("predictor {other} with compression {compression}");
+                let found = format!("predictor {other} with compression {number}");
                 return of(found, "1, or with LZW and deflate 2 and, for floats, 3");
             }
-        }
+        };
         if directory.number(tag::FILL_ORDER, Some(1))? != 1 {
             return of("fill order 2".to_owned(), "1");
         }
@@ -75,10 +124,23 @@ impl Layout {
         };
         let (rgb, alpha) = interpretation(&directory, stored)?;
         let (chunks, places) = places(&directory)?;
-        if planar && matches!(chunks, Chunks::Tiles { .. }) {
-            return of("separate planes in tiles".to_owned(), "separate planes in strips");
+        if let Chunks::Tiles { width, height } = chunks {
+            // A tile is unpacked whole, whatever part of it lies in the picture.
+            Size::within((width, height), stored, sample_type, at, limits)?;
         }
-        Ok(Layout { size, sample_type, alpha, planar, rgb, compression, expansion, chunks, places })
+        let little_endian = directory.little_endian();
+        Ok(Layout {
+            size,
+            sample_type,
+            alpha,
+            planar,
+            little_endian,
+            compression,
+            predictor,
+            rgb,
+            chunks,
+            places,
+        })
     }
 
     /// Names of the channels but alpha.
@@ -90,46 +152,73 @@ impl Layout {
         (0..channels).map(|number| format!("C{number}")).collect()
     }
 
+    /// Channels side by side in a strip or tile.
+    pub(super) fn channels_in_chunk(&self) -> usize {
+        if self.planar { 1 } else { self.size.channels }
+    }
+
+    /// All strips or tiles: from the top, in a row of tiles from the left, and so for each plane.
+    pub(super) fn chunks(&self) -> impl Iterator<Item = Chunk> {
+        let (width, height) = (u64::from(self.size.width), u64::from(self.size.height));
+        let (across, down) = self.grid();
+        let places = self.places.iter().enumerate().zip(0u64..);
+        places.map(move |((number, &(offset, len)), counted)| {
+            let in_plane = counted.checked_rem(across.saturating_mul(down)).unwrap_or(0);
+            let plane = counted.checked_div(across.saturating_mul(down)).unwrap_or(0);
+            let column = in_plane.checked_rem(across).unwrap_or(0);
+            let row = in_plane.checked_div(across).unwrap_or(0);
+            match self.chunks {
+                // The last strip holds the rows that are left.
+                Chunks::Strips { rows } => {
+                    let y = row.saturating_mul(rows);
+                    let rows = rows.min(height.saturating_sub(y));
+                    Chunk { number, offset, len, plane, x: 0, y, width, rows }
+                }
+                Chunks::Tiles { width, height } => {
+                    let (x, y) = (column.saturating_mul(width), row.saturating_mul(height));
+                    Chunk { number, offset, len, plane, x, y, width, rows: height }
+                }
+            }
+        })
+    }
+
+    /// Strips or tiles of a plane side by side and below each other.
+    fn grid(&self) -> (u64, u64) {
+        let (width, height) = (u64::from(self.size.width), u64::from(self.size.height));
+        match self.chunks {
+            Chunks::Strips { rows } => (1, height.div_ceil(rows)),
+            Chunks::Tiles { width: across, height: down } => (width.div_ceil(across), height.div_ceil(down)),
+        }
+    }
+
+    pub(super) fn decoded_bytes(&self, chunk: &Chunk) -> u64 {
+        let channels = u64::try_from(self.channels_in_chunk()).unwrap_or(u64::MAX);
+        let pixel = u64::try_from(self.sample_type.bytes()).unwrap_or(u64::MAX).saturating_mul(channels);
+        chunk.width.saturating_mul(chunk.rows).saturating_mul(pixel)
+    }
+
     /// Every strip or tile lies within the file, apart from the others, and is long enough for what it must hold.
     pub(super) fn require_data(&self, bytes: &[u8]) -> Result<()> {
-        let sample_bytes = u64::try_from(self.sample_type.bytes()).unwrap_or(u64::MAX);
-        let channels = u64::try_from(self.size.channels).unwrap_or(u64::MAX);
-        let (side_by_side, planes) = if self.planar { (1, channels) } else { (channels, 1) };
-        let pixel_bytes = sample_bytes.saturating_mul(side_by_side);
-        let (width, height) = (u64::from(self.size.width), u64::from(self.size.height));
-        // Of a plane: how many chunks, and the rows and pixels of one row of a chunk.
-        let (count, row, rows) = match self.chunks {
-            Chunks::Strips { rows } => (height.div_ceil(rows), width, rows.min(height)),
-            Chunks::Tiles { width: across, height: down } => {
-                (width.div_ceil(across).saturating_mul(height.div_ceil(down)), across, down)
-            }
-        };
-        let expected = count.saturating_mul(planes);
+        let (across, down) = self.grid();
+        let planes = if self.planar { u64::try_from(self.size.channels).unwrap_or(u64::MAX) } else { 1 };
+        let expected = across.saturating_mul(down).saturating_mul(planes);
         if u64::try_from(self.places.len()).ok() != Some(expected) {
             let found = format!("{} strips or tiles", self.places.len());
-            return Err(Error::malformed(found, format!("{expected} for {width} x {height} pixels")));
+            let wanted = format!("{expected} for {} x {} pixels", self.size.width, self.size.height);
+            return Err(Error::malformed(found, wanted));
         }
-        for (number, &(offset, len)) in (0u64..).zip(&self.places) {
-            let rows = match self.chunks {
-                // The last strip of a plane holds the rows that are left.
-                Chunks::Strips { rows } => {
-                    let before = number.checked_rem(count).unwrap_or(0).saturating_mul(rows);
-                    rows.min(height.saturating_sub(before))
-                }
-                Chunks::Tiles { .. } => rows,
-            };
-            let decoded = row.saturating_mul(pixel_bytes).saturating_mul(rows);
-            let file = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
-            let inside = offset.checked_add(len).is_some_and(|end| end <= file);
-            if !inside {
+        let file = u64::try_from(bytes.len()).unwrap_or(u64::MAX);
+        for chunk in self.chunks() {
+            let Chunk { number, offset, len, .. } = chunk;
+            if offset.checked_add(len).is_none_or(|end| end > file) {
                 let found = format!("strip or tile {number} of {len} bytes at {offset}");
                 return Err(
                     Error::malformed(found, format!("it within the {file} bytes of the file")).at(offset)
                 );
             }
-            if len.saturating_mul(self.expansion) < decoded {
-                let found =
-                    format!("{len} bytes of strip or tile {number} by compression {}", self.compression);
+            let decoded = self.decoded_bytes(&chunk);
+            if len.saturating_mul(self.compression.expansion()) < decoded {
+                let found = format!("{len} bytes of strip or tile {number} ({:?})", self.compression);
                 return Err(Error::malformed(found, format!("enough for {decoded} bytes")).at(offset));
             }
         }

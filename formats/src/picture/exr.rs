@@ -1,0 +1,56 @@
+//! OpenEXR: one flat part of half and float channels, in scan lines or tiles.
+//!
+//! The container is read here, strictly: every chunk of the offset table must be there, at its place, with a
+//! length that its pixels can come from. The crate `exr` decompresses one chunk at a time. (Its own reader sizes its tables by the
+//! header before it has seen that many bytes, takes the last of two attributes of one name, and goes on where
+//! the offset table is damaged.)
+//!
+//! The picture is the data window; the display window is ignored, so that whoever reads a set compares sizes.
+//! Chromaticities and white luminance are not applied. Refused: several parts or layers, deep data, mip maps, subsampled
+//! channels, HTJ2K.
+//!
+//! Source: "OpenEXR File Layout" of the Academy Software Foundation.
+
+mod channels;
+mod chunks;
+mod encode;
+mod header;
+mod pixels;
+
+pub use encode::{Compression, encode};
+
+use super::{Picture, PictureHeader};
+use crate::{Limits, Result};
+
+use header::Header;
+
+pub(super) use header::MAGIC;
+
+pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
+    Ok(of_header(&Header::read(bytes, limits)?))
+}
+
+pub(super) fn check(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
+    let header = Header::read(bytes, limits)?;
+    chunks::find(bytes, &header)?;
+    Ok(of_header(&header))
+}
+
+pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
+    let header = Header::read(bytes, limits)?;
+    let chunks = chunks::find(bytes, &header)?;
+    let samples = pixels::read(bytes, &header, &chunks)?;
+    let PictureHeader { width, height, channels, .. } = of_header(&header);
+    Ok(Picture { width, height, channels, samples })
+}
+
+fn of_header(header: &Header) -> PictureHeader {
+    PictureHeader {
+        width: header.size.width,
+        height: header.size.height,
+        channels: header.channels.names(),
+        sample_type: header.channels.sample_type(),
+        linear: true,
+        scanlines_are_columns: false,
+    }
+}

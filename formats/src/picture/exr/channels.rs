@@ -1,0 +1,155 @@
+//! The channel list, and the order that its channels are handed out in.
+
+use exr::meta::attribute::SampleType as Stored;
+
+use crate::picture::size::unsupported;
+use crate::picture::wavelength::{quantity, wavelength_nm};
+use crate::reader::Reader;
+use crate::{Error, Result, SampleType};
+
+#[derive(Debug, Clone)]
+pub(super) struct Channel {
+    pub(super) name: String,
+    pub(super) stored: Stored,
+    pub(super) quantize_linearly: bool,
+}
+
+impl Channel {
+    pub(super) fn is_alpha(&self) -> bool {
+        self.name == "A"
+    }
+}
+
+/// The channels of a picture.
+#[derive(Debug, Clone)]
+pub(super) struct Channels {
+    /// As in the file: sorted by name, alpha too.
+    pub(super) stored: Vec<Channel>,
+    /// Numbers of the channels but alpha, in the order in which they are handed out.
+    pub(super) order: Vec<usize>,
+}
+
+impl Channels {
+    /// Reads an attribute of type `chlist`.
+    pub(super) fn read(data: &[u8]) -> Result<Channels> {
+        let mut reader = Reader::new(data);
+        let mut stored: Vec<Channel> = Vec::new();
+        loop {
+            let name = text(&mut reader)?;
+            if name.is_empty() {
+                break;
+            }
+            if stored.last().is_some_and(|before| before.name >= name) {
+                return Err(Error::malformed(
+                    format!("the channel {name:?} out of order"),
+                    "names that ascend",
+                ));
+            }
+            let kind = match reader.i32_le()? {
+                0 => Stored::U32,
+                1 => Stored::F16,
+                2 => Stored::F32,
+                other => return Err(Error::malformed(format!("samples of type {other}"), "0, 1 or 2")),
+            };
+            let quantize_linearly = reader.u8()? != 0;
+            reader.take(3)?;
+            let sampling = (reader.i32_le()?, reader.i32_le()?);
+            if sampling != (1, 1) {
+                let found = format!("the channel {name:?} with sampling {sampling:?}");
+                return Err(unsupported(found, "a sample at every pixel"));
+            }
+            stored.push(Channel { name, stored: kind, quantize_linearly });
+        }
+        require_one_layer(&stored)?;
+        let order = order_of(&stored);
+        if order.is_empty() {
+            return Err(unsupported(format!("{} channels", stored.len()), "a channel that is not alpha"));
+        }
+        Ok(Channels { stored, order })
+    }
+
+    pub(super) fn names(&self) -> Vec<String> {
+        self.order
+            .iter()
+            .filter_map(|&number| self.stored.get(number))
+            .map(|channel| channel.name.clone())
+            .collect()
+    }
+
+    /// Halves if all channels but alpha are halves.
+    pub(super) fn sample_type(&self) -> SampleType {
+        let mut colours = self.stored.iter().filter(|channel| !channel.is_alpha());
+        if colours.all(|channel| channel.stored == Stored::F16) { SampleType::F16 } else { SampleType::F32 }
+    }
+
+    pub(super) fn bytes_per_pixel(&self) -> u64 {
+        let bytes = self.stored.iter().map(|channel| if channel.stored == Stored::F16 { 2u64 } else { 4 });
+        bytes.fold(0, u64::saturating_add)
+    }
+}
+
+/// Text up to a zero byte, which is read too.
+pub(super) fn text(reader: &mut Reader<'_>) -> Result<String> {
+    const LONGEST: usize = 255;
+    let at = reader.position();
+    let rest = reader.rest();
+    let Some(len) = rest.iter().take(LONGEST.saturating_add(1)).position(|&byte| byte == 0) else {
+        return Err(Error::malformed("a name without an end", "at most 255 bytes and a zero").at(at));
+    };
+    let bytes = reader.take(len)?;
+    reader.take(1)?;
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Ok(text.to_owned()),
+        Err(_) => Err(Error::malformed(format!("the name {}", bytes.escape_ascii()), "text (UTF-8)").at(at)),
+    }
+}
+
+/// A point in a name separates the layer from the channel, unless it is that of a wavelength.
+fn layer(name: &str) -> &str {
+    if wavelength_nm(name).is_some() {
+        // Unpolarised emission and reflectance are the picture itself.
+        return match quantity(name) {
+            ("S0" | "T", _) => "",
+            (other, _) => other,
+        };
+    }
+    name.rsplit_once('.').map_or("", |(layer, _)| layer)
+}
+
+fn require_one_layer(channels: &[Channel]) -> Result<()> {
+    let mut layers: Vec<&str> = channels.iter().map(|channel| layer(&channel.name)).collect();
+    layers.sort_unstable();
+    layers.dedup();
+    match layers.as_slice() {
+        [] | [""] => Ok(()),
+        _ => Err(unsupported(format!("the layers {layers:?}"), "channels without layers")),
+    }
+}
+
+/// R, G, B; then Y, or X, Y, Z; then wavelengths from short to long; then others by name.
+fn order_of(channels: &[Channel]) -> Vec<usize> {
+    let rank = |name: &str| -> (u8, f64) {
+        match (name, wavelength_nm(name)) {
+            ("R", _) => (0, 0.0),
+            ("G", _) => (1, 0.0),
+            ("B", _) => (2, 0.0),
+            ("X", _) => (3, 0.0),
+            ("Y", _) => (4, 0.0),
+            ("Z", _) => (5, 0.0),
+            (_, Some(wavelength)) => (6, wavelength),
+            _ => (7, 0.0),
+        }
+    };
+    let mut order: Vec<usize> = Vec::new();
+    order.extend(
+        channels.iter().enumerate().filter(|(_, channel)| !channel.is_alpha()).map(|(number, _)| number),
+    );
+    // Stable, so that equal ranks stay in the order of their names.
+    order.sort_by(|&a, &b| {
+        let of =
+            |number| channels.get(number).map_or((u8::MAX, 0.0), |channel: &Channel| rank(&channel.name));
+        let ((a_rank, a_nm), (b_rank, b_nm)) = (of(a), of(b));
+        a_rank.cmp(&b_rank).then(a_nm.total_cmp(&b_nm))
+    });
+    order
+}

@@ -1,0 +1,168 @@
+//! The first image file directory of a TIFF (TIFF 6.0, section 2; BigTIFF: libtiff's specification).
+
+use crate::picture::size::unsupported;
+use crate::reader::Reader;
+use crate::{Error, Result};
+
+/// Numbers of the tags that are looked at.
+pub(super) mod tag {
+    pub(crate) const WIDTH: u16 = 256;
+    pub(crate) const HEIGHT: u16 = 257;
+    pub(crate) const BITS_PER_SAMPLE: u16 = 258;
+    pub(crate) const COMPRESSION: u16 = 259;
+    pub(crate) const PHOTOMETRIC: u16 = 262;
+    pub(crate) const FILL_ORDER: u16 = 266;
+    pub(crate) const STRIP_OFFSETS: u16 = 273;
+    pub(crate) const ORIENTATION: u16 = 274;
+    pub(crate) const SAMPLES_PER_PIXEL: u16 = 277;
+    pub(crate) const ROWS_PER_STRIP: u16 = 278;
+    pub(crate) const STRIP_BYTE_COUNTS: u16 = 279;
+    pub(crate) const PLANAR_CONFIGURATION: u16 = 284;
+    pub(crate) const PREDICTOR: u16 = 317;
+    pub(crate) const TILE_WIDTH: u16 = 322;
+    pub(crate) const TILE_LENGTH: u16 = 323;
+    pub(crate) const TILE_OFFSETS: u16 = 324;
+    pub(crate) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(crate) const EXTRA_SAMPLES: u16 = 338;
+    pub(crate) const SAMPLE_FORMAT: u16 = 339;
+}
+
+/// Fields of either byte order, and of either width where the two forms of TIFF differ.
+struct Fields<'a> {
+    reader: Reader<'a>,
+    little_endian: bool,
+    big: bool,
+}
+
+impl<'a> Fields<'a> {
+    fn uint(&mut self, len: usize) -> Result<u64> {
+        let bytes = self.reader.take(len)?;
+        let add = |value: u64, &byte: &u8| (value << 8) | u64::from(byte);
+        Ok(if self.little_endian { bytes.iter().rev().fold(0, add) } else { bytes.iter().fold(0, add) })
+    }
+
+    fn u16(&mut self) -> Result<u16> {
+        Ok(u16::try_from(self.uint(2)?).unwrap_or_default())
+    }
+
+    /// An offset or a count: 4 bytes, or 8 in BigTIFF.
+    fn word(&mut self) -> Result<u64> {
+        self.uint(self.word_len())
+    }
+
+    fn word_len(&self) -> usize {
+        if self.big { 8 } else { 4 }
+    }
+
+    fn moved_to(&self, bytes: &'a [u8], offset: u64) -> Result<Fields<'a>> {
+        let mut reader = Reader::new(bytes);
+        reader.take(usize::try_from(offset).unwrap_or(usize::MAX))?;
+        Ok(Fields { reader, little_endian: self.little_endian, big: self.big })
+    }
+}
+
+struct Entry {
+    tag: u16,
+    kind: u16,
+    count: u64,
+    /// Where the values start, from the start of the file.
+    at: u64,
+}
+
+/// The entries of the only directory of a file.
+pub(super) struct Directory<'a> {
+    bytes: &'a [u8],
+    start: Fields<'a>,
+    entries: Vec<Entry>,
+    pub(super) at: usize,
+}
+
+impl<'a> Directory<'a> {
+    pub(super) fn read(bytes: &'a [u8]) -> Result<Directory<'a>> {
+        let mut start = Fields { reader: Reader::new(bytes), little_endian: false, big: false };
+        start.little_endian = match start.reader.take(2)? {
+            b"II" => true,
+            b"MM" => false,
+            other => {
+                return Err(Error::malformed(format!("{other:02x?}"), "the byte order II or MM").at(0usize));
+            }
+        };
+        start.big = match start.u16()? {
+            42 => false,
+            43 => true,
+            other => return Err(Error::malformed(format!("the version {other}"), "42 or 43").at(2usize)),
+        };
+        if start.big && (start.u16()?, start.u16()?) != (8, 0) {
+            return Err(Error::malformed("other offsets", "BigTIFF with offsets of 8 bytes").at(4usize));
+        }
+        let offset = start.word()?;
+        let mut fields = start.moved_to(bytes, offset)?;
+        let at = fields.reader.position();
+        let count = if fields.big { fields.word()? } else { u64::from(fields.u16()?) };
+        // An entry takes 12 or 20 bytes, so that the end of the file ends this loop.
+        let mut entries = Vec::new();
+        for _ in 0..count {
+            let (tag, kind, count) = (fields.u16()?, fields.u16()?, fields.word()?);
+            let value_at = fields.reader.position();
+            let value = fields.word()?;
+            let inline = count.saturating_mul(u64::from(bytes_of(kind).unwrap_or(u8::MAX)))
+                <= u64::try_from(fields.word_len()).unwrap_or_default();
+            let at = if inline { u64::try_from(value_at).unwrap_or(u64::MAX) } else { value };
+            entries.push(Entry { tag, kind, count, at });
+        }
+        if fields.word()? != 0 {
+            return Err(unsupported("a second directory", "one picture in the file").at(at));
+        }
+        entries.sort_by_key(|entry| entry.tag);
+        if let Some((entry, _)) = entries.iter().zip(entries.iter().skip(1)).find(|(a, b)| a.tag == b.tag) {
+            return Err(Error::malformed(format!("two entries of tag {}", entry.tag), "one").at(at));
+        }
+        Ok(Directory { bytes, start, entries, at })
+    }
+
+    pub(super) fn little_endian(&self) -> bool {
+        self.start.little_endian
+    }
+
+    /// The unsigned integers of a tag, if there is one.
+    pub(super) fn list(&self, tag: u16) -> Result<Option<Vec<u64>>> {
+        let Some(entry) = self.entries.iter().find(|entry| entry.tag == tag) else { return Ok(None) };
+        let Some(len) = bytes_of(entry.kind).filter(|_| matches!(entry.kind, 1 | 3 | 4 | 13 | 16 | 18))
+        else {
+            let found = format!("the type {} of tag {tag}", entry.kind);
+            return Err(Error::malformed(found, "unsigned integers").at(self.at));
+        };
+        let mut fields = self.start.moved_to(self.bytes, entry.at)?;
+        let left = fields.reader.rest().len();
+        let needed = entry.count.saturating_mul(u64::from(len));
+        if needed > u64::try_from(left).unwrap_or(u64::MAX) {
+            let found = format!("{left} bytes for the {} values of tag {tag}", entry.count);
+            return Err(Error::malformed(found, format!("{needed}")).at(fields.reader.position()));
+        }
+        (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
+    }
+
+    /// The only value of a tag, or `default` where there is no such tag.
+    pub(super) fn number(&self, tag: u16, default: Option<u64>) -> Result<u64> {
+        match (self.list(tag)?.as_deref(), default) {
+            (Some([value]), _) => Ok(*value),
+            (Some(list), _) => {
+                let found = format!("{} values of tag {tag}", list.len());
+                Err(Error::malformed(found, "one").at(self.at))
+            }
+            (None, Some(value)) => Ok(value),
+            (None, None) => Err(Error::malformed(format!("no tag {tag}"), "one").at(self.at)),
+        }
+    }
+}
+
+/// Bytes of a value of a type.
+fn bytes_of(kind: u16) -> Option<u8> {
+    match kind {
+        1 | 2 | 6 | 7 => Some(1),
+        3 | 8 => Some(2),
+        4 | 9 | 11 | 13 => Some(4),
+        5 | 10 | 12 | 16 | 17 | 18 => Some(8),
+        _ => None,
+    }
+}

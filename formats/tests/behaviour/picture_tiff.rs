@@ -1,0 +1,142 @@
+//! TIFF: types, byte orders, strips, tiles, planes, channels of no meaning.
+
+use btfkit_formats::picture::{Picture, decode, header};
+use btfkit_formats::{ErrorKind, Limits, Samples};
+
+use crate::picture_files::{Tiff, pattern_samples, tiff_by_crate, tiff_samples};
+
+fn read(bytes: &[u8]) -> Picture {
+    decode(bytes, &Limits::default()).unwrap()
+}
+
+const KINDS: [(&str, u64, u64); 4] = [("u8", 8, 1), ("u16", 16, 1), ("f16", 16, 3), ("f32", 32, 3)];
+
+#[test]
+fn samples_are_those_written_in_every_order_of_bytes_and_planes() {
+    for (kind, bits, format) in KINDS {
+        for little_endian in [true, false] {
+            for big in [true, false] {
+                for (channels, planar) in [(1, false), (3, false), (3, true), (7, false), (7, true)] {
+                    for rows in [1, 2, 5, 100] {
+                        let mut tiff = Tiff::new((3, 5, channels), bits, format, rows);
+                        (tiff.little_endian, tiff.big) = (little_endian, big);
+                        let samples = tiff_samples(&tiff, 3 * 5 * channels, kind);
+                        let bytes = tiff.with_strips(&samples, rows.min(5), planar).bytes();
+                        let picture = read(&bytes);
+                        assert_eq!(
+                            picture.samples,
+                            pattern_samples(3 * 5 * channels, kind),
+                            "{kind} {channels} {planar}"
+                        );
+                        let names = ["Y", "", "RGB", "", "", "", "C0C1C2C3C4C5C6"];
+                        assert_eq!(picture.channels.concat(), names[channels - 1]);
+                        assert_eq!(header(&bytes, &Limits::default()).unwrap().linear, format == 3);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn tiles_are_put_together() {
+    for (kind, bits, format) in KINDS {
+        for (width, height, channels) in [(40, 20, 1), (40, 20, 3), (16, 16, 1), (5, 3, 4)] {
+            let mut tiff = Tiff::new((width, height, channels), bits, format, 1);
+            tiff.tags.retain(|(tag, _)| *tag != 278);
+            let samples = tiff_samples(&tiff, width * height * channels, kind);
+            let empty = tiff.uint(0, bits as usize / 8);
+            for top in (0..height).step_by(16) {
+                for left in (0..width).step_by(16) {
+                    let mut tile = Vec::new();
+                    for y in top..top + 16 {
+                        for x in (left..left + 16).flat_map(|x| std::iter::repeat_n(x, channels).zip(0..)) {
+                            let inside = y < height && x.0 < width;
+                            let number = (y * width + x.0) * channels + x.1;
+                            tile.extend(if inside { &samples[number] } else { &empty });
+                        }
+                    }
+                    tiff.chunks.push(tile);
+                }
+            }
+            let bytes = tiff.set(322, &[16]).set(323, &[16]).bytes();
+            assert_eq!(
+                read(&bytes).samples,
+                pattern_samples(width * height * channels, kind),
+                "{kind} x {channels}"
+            );
+        }
+    }
+}
+
+#[test]
+fn compressed_samples_are_those_of_the_encoder() {
+    use tiff::encoder::{Compression, DeflateLevel};
+    use tiff::tags::Predictor;
+    let plain = read(&tiff_by_crate(Compression::Uncompressed, Predictor::None));
+    assert!(matches!(&plain.samples, Samples::U16(list) if list.iter().any(|&s| s > 0xF000)));
+    for compression in [Compression::Lzw, Compression::Deflate(DeflateLevel::Fast), Compression::Packbits] {
+        assert_eq!(read(&tiff_by_crate(compression, Predictor::None)), plain);
+    }
+    for compression in [Compression::Lzw, Compression::Deflate(DeflateLevel::Fast)] {
+        assert_eq!(read(&tiff_by_crate(compression, Predictor::Horizontal)), plain);
+    }
+}
+
+#[test]
+fn opaque_alpha_is_dropped_and_other_alpha_refused() {
+    for (channels, photometric) in [(2usize, 1), (4, 2)] {
+        for opaque in [true, false] {
+            let mut tiff = Tiff::new((3, 2, channels), 8, 1, 2);
+            tiff.set(262, &[photometric]).set(338, &[2]);
+            let mut samples = tiff_samples(&tiff, 6 * channels, "u8");
+            for alpha in samples.iter_mut().skip(channels - 1).step_by(channels) {
+                *alpha = vec![255];
+            }
+            let Samples::U8(expected) = pattern_samples(6 * channels, "u8") else { unreachable!() };
+            let expected =
+                expected.chunks(channels).flat_map(|pixel| pixel[..channels - 1].to_vec()).collect();
+            if !opaque {
+                samples[5 * channels - 1] = vec![254];
+            }
+            let read = decode(&tiff.with_strips(&samples, 2, false).bytes(), &Limits::default());
+            if opaque {
+                assert_eq!(read.unwrap().samples, Samples::U8(expected));
+            } else {
+                let error = read.unwrap_err();
+                assert!(error.to_string().contains("pixel 4"), "{error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_read_is_refused_with_its_reason() {
+    let good = Tiff::new((4, 4, 3), 8, 1, 4);
+    let samples = tiff_samples(&good, 48, "u8");
+    let good = good.with_strips(&samples, 4, false);
+    assert!(decode(&good.bytes(), &Limits::default()).is_ok());
+    for (tag, values, words) in [
+        (259, vec![7], "compression 7"),
+        (259, vec![4], "compression 4"),
+        (262, vec![0], "photometric interpretation 0"),
+        (262, vec![3], "photometric interpretation 3"),
+        (262, vec![5], "photometric interpretation 5"),
+        (262, vec![6], "photometric interpretation 6"),
+        (266, vec![2], "fill order"),
+        (274, vec![6], "orientation 6"),
+        (317, vec![2], "predictor 2"),
+        (258, vec![12; 3], "12 bits"),
+        (258, vec![8, 8, 16], "values [8, 8, 16]"),
+        (339, vec![2; 3], "format 2"),
+        (338, vec![0], "extra samples [0]"),
+    ] {
+        let error = decode(&good.clone().set(tag, &values).bytes(), &Limits::default()).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported, "{error}");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+    let mut doubled = good.clone();
+    doubled.tags.push((256, vec![4]));
+    let error = decode(&doubled.bytes(), &Limits::default()).unwrap_err();
+    assert!(error.to_string().contains("two entries of tag 256"), "{error}");
+}

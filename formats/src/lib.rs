@@ -46,6 +46,7 @@
     )
 )]
 
+pub mod bonn;
 mod contents;
 mod direction;
 mod error;

@@ -66,7 +66,7 @@ fn every_signature_scalar_and_orientation_is_read() {
                     let mut bytes = btf.head(signature, rotations);
                     bytes.extend(btf.pvf(size, transposed));
                     check_images(&name(signature), &bytes, &btf, |at, c| {
-                        if transposed { btf.transposed_pvf_value(at, c) } else { btf.pvf_value(at, c, false) }
+                        if transposed { btf.transposed_pvf_value(at, c) } else { btf.pvf_value(at, c) }
                     });
                     assert_eq!(recognise(&bytes), Some(Kind::Pvf));
                 }
@@ -140,7 +140,7 @@ fn the_older_form_of_pvf_is_read() {
         put_u32s(&mut bytes, &[301_074, btf.rank as u32, btf.width, btf.height, views]);
         btf.put_directions(&mut bytes);
         bytes.extend(btf.pvf_slots(4, false));
-        check_images(signature, &bytes, &btf, |at, c| btf.pvf_value(at, c, false));
+        check_images(signature, &bytes, &btf, |at, c| btf.pvf_value(at, c));
         let archive = open(&bytes);
         assert!(archive.contents().assumptions.iter().any(|text| text.contains("too old to say")));
         assert_eq!(remark(&archive, "header"), Some("legacy"));
@@ -256,7 +256,7 @@ fn orientation_that_the_sizes_leave_open_is_an_assumption() {
     assert_eq!(assumed(&six, six.dfmf(4, 0, false), "!DFMF08FCR"), expected);
     let expected = (true, six.images(1, |at, c| six.fmf_value(at, c)));
     assert_eq!(assumed(&six, six.fmf(4, false), "!FMF06FCR"), expected);
-    let expected = (true, three.images(1, |at, c| three.pvf_value(at, c, false)));
+    let expected = (true, three.images(1, |at, c| three.pvf_value(at, c)));
     assert_eq!(assumed(&three, three.pvf(4, false), "!PVF06FCR"), expected);
     assert!(!assumed(&Btf::small(), Btf::small().fmf(4, false), "!FMF06FCR").0);
 }

@@ -134,11 +134,10 @@ impl Btf {
         self.product(at, channel, 0)
     }
 
-    /// What a PVF file holds whose mean depends on what its left rows depend on.
-    pub(crate) fn pvf_value(&self, at: [usize; 3], channel: usize, transposed: bool) -> f64 {
-        let [view, light, pixel] = at;
-        let mean = if transposed { self.mean(view, pixel, channel) } else { self.mean(view, light, channel) };
-        self.product(at, channel, if transposed { channel } else { 0 }) + mean
+    /// What a PVF file holds: its left rows are lights and channels.
+    pub(crate) fn pvf_value(&self, at: [usize; 3], channel: usize) -> f64 {
+        let [view, light, _] = at;
+        self.product(at, channel, 0) + self.mean(view, light, channel)
     }
 
     fn mean(&self, view: usize, left: usize, channel: usize) -> f64 {
@@ -228,10 +227,9 @@ impl Btf {
     }
 
     /// What a transposed PVF file holds: its left rows are pixels and channels.
-    pub(crate) fn transposed_pvf_value(&self, [view, light, pixel]: [usize; 3], channel: usize) -> f64 {
-        let components = 0..self.rank;
-        let sum: f64 = components.map(|k| self.left(view, light, 0, k) * self.right(pixel, channel, k)).sum();
-        sum + self.mean(view, pixel, channel)
+    pub(crate) fn transposed_pvf_value(&self, at: [usize; 3], channel: usize) -> f64 {
+        let [view, _, pixel] = at;
+        self.product(at, 0, channel) + self.mean(view, pixel, channel)
     }
 
     /// The payload of a PVF file with a common header.

@@ -48,6 +48,7 @@
 
 mod angles;
 mod catalogue;
+pub mod bonn;
 mod contents;
 mod direction;
 pub mod directions;

@@ -6,6 +6,11 @@
     clippy::print_stdout // the test on real files says whether it found any
 )]
 
+mod bonn_color;
+mod bonn_damage;
+mod bonn_reading;
+mod bonn_support;
+mod bonn_writing;
 mod catalogue;
 mod damage;
 mod jpeg;

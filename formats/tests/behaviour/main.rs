@@ -10,6 +10,8 @@ mod catalogue;
 mod damage;
 mod jpeg;
 mod measured_files;
+mod mlvq;
+mod mlvq_files;
 mod support;
 mod zip_reading;
 mod zip_writing;

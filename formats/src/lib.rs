@@ -62,6 +62,8 @@ pub mod npy;
 pub mod picture;
 mod reader;
 pub mod rti;
+pub mod mlvq;
+mod request;
 mod samples;
 pub mod table;
 pub mod ubo2003;

@@ -25,6 +25,8 @@ mod picture_files;
 mod picture_hdr;
 mod picture_png;
 mod picture_tiff;
+mod mlvq;
+mod mlvq_files;
 mod support;
 mod zip_reading;
 mod zip_writing;

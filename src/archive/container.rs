@@ -3,10 +3,12 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{Contents, Images, Samples};
+use btfkit_formats::npy::{self, Beside};
+use btfkit_formats::{Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq};
 use sha2::{Digest, Sha256};
 
-use super::Source;
+use super::adapt::Type;
+use super::{HEAD_BYTES, Options, Source, files, read_beside};
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use crate::store::mapped::MappedFile;
@@ -18,8 +20,94 @@ const GROUPS: usize = 8;
 /// Bytes of the file that are looked at at a time.
 const DIGEST_STEP: usize = 8 << 20;
 
+/// The beginning of every `.npy` file.
+const NPY_MAGIC: &[u8] = b"\x93NUMPY";
+
+/// A container, and the type that its samples are best kept as where that is not their own.
+pub(super) struct Recognised {
+    pub(super) source: Box<dyn Source>,
+    pub(super) samples: Option<Type>,
+}
+
+/// Opens a file that is a container by its first bytes; `None` if it is none.
+pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
+    let head = files::read_head(path, HEAD_BYTES)?;
+    let mut samples = None;
+    let opened = if bonn::recognise(&head).is_some() {
+        Container::open(path, |bytes| {
+            let mut how = bonn::OpenOptions::default();
+            how.rows = options.rows;
+            Ok(Box::new(bonn::Archive::open(bytes, &how, limits)?))
+        })
+    } else if mlvq::recognise(&head) {
+        samples = Some(Type::U8);
+        let known = zero_bytes_beside(path)?;
+        Container::open(path, |bytes| Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?)))
+    } else if big::recognise(&head) {
+        let order = order(options)?;
+        Container::open(path, |bytes| {
+            let mut how = big::Options::default();
+            how.order = order;
+            Ok(Box::new(big::Big::open(bytes, &how, limits)?))
+        })
+    } else if mif::recognise(&head) {
+        let order = order(options)?;
+        Container::open(path, |bytes| {
+            let mut how = mif::Options::default();
+            how.order = order;
+            Ok(Box::new(mif::Mif::open(bytes, &how, limits)?))
+        })
+    } else if head.starts_with(NPY_MAGIC) {
+        let beside = directions_beside(path, options, limits)?;
+        Container::open(path, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
+    } else {
+        return Ok(None);
+    };
+    Ok(Some(Recognised { source: Box::new(opened?), samples }))
+}
+
+/// The order of images that the user names for a BIG or MIF file.
+fn order(options: &Options) -> Result<btfkit_formats::Order> {
+    let Some(name) = &options.order else { return Ok(btfkit_formats::Order::default()) };
+    btfkit_formats::Order::published(name).ok_or_else(|| {
+        Error::new(crate::Kind::Usage, format!("got the order {name:?}, expected ubo81 or uniform"))
+    })
+}
+
+/// What is known of the ambiguous bytes of a database, from `zero_bytes.txt` in its folder.
+fn zero_bytes_beside(path: &Path) -> Result<mlvq::ZeroBytes> {
+    let file = path.with_file_name("zero_bytes.txt");
+    if !file.is_file() {
+        return Ok(mlvq::ZeroBytes::default());
+    }
+    let text = String::from_utf8_lossy(&read_beside(&file)?).into_owned();
+    mlvq::ZeroBytes::parse(&text).map_err(|error| Error::from(error).context(file.display()))
+}
+
+/// The directions of `NAME.npy`: `NAME.views.npy` and `NAME.lights.npy`, or a published list that the user names.
+fn directions_beside(path: &Path, options: &Options, limits: &Limits) -> Result<Beside> {
+    let list = |kind: &str| -> Result<Option<Vec<Direction>>> {
+        let file = path.with_extension(format!("{kind}.npy"));
+        if !file.is_file() {
+            return Ok(None);
+        }
+        let found = npy::directions(&read_beside(&file)?, limits);
+        found.map(Some).map_err(|error| Error::from(error).context(file.display()))
+    };
+    let mut beside = Beside { views: list("views")?, lights: list("lights")? };
+    if let Some(name) = &options.order {
+        let published = directions::published(name).ok_or_else(|| {
+            Error::new(crate::Kind::Usage, format!("got the list {name:?}, expected ubo81 or bonn151"))
+        })?;
+        let published: Vec<Direction> = published.into_iter().map(|angles| angles.direction()).collect();
+        beside.lights.get_or_insert_with(|| published.clone());
+        beside.views.get_or_insert(published);
+    }
+    Ok(beside)
+}
+
 /// A container, mapped.
-pub(super) struct Container {
+struct Container {
     path: PathBuf,
     file: MappedFile,
     images: Box<dyn Images>,
@@ -27,12 +115,16 @@ pub(super) struct Container {
 
 impl Container {
     /// Maps a file and opens it by `open`.
-    pub(super) fn open(
+    fn open(
         path: &Path,
         open: impl FnOnce(&[u8]) -> btfkit_formats::Result<Box<dyn Images>>,
     ) -> Result<Self> {
         let file = MappedFile::open(path).map_err(|error| Error::io("read", path, error))?;
-        let images = open(file.as_ref()).map_err(|error| Error::from(error).context(path.display()))?;
+        let images = open(file.as_ref()).map_err(|error| {
+            let missing = error.kind() == ErrorKind::Argument;
+            let error = Error::from(error).context(path.display());
+            if missing { error.hint("--order names a published list of directions (ubo81, bonn151, uniform)") } else { error }
+        })?;
         Ok(Self { path: path.to_owned(), file, images })
     }
 }

@@ -43,13 +43,17 @@ impl Files {
     pub fn list(paths: &[PathBuf], limits: &Limits) -> Result<Self> {
         let mut files = Self { zips: Vec::new(), entries: Vec::new() };
         for path in paths {
+            // A light list stands for the pictures beside it.
+            let list = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("lp")) && path.is_file();
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let path = if list { folder.unwrap_or(Path::new(".")) } else { path };
             let data = fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
             if data.is_dir() {
                 for file in list_folder(path)? {
                     files.add(file, limits)?;
                 }
             } else {
-                files.add(path.clone(), limits)?;
+                files.add(path.to_owned(), limits)?;
             }
         }
         Ok(files)

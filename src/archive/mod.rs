@@ -4,19 +4,25 @@
 //! [`Source`]. [`adapt`] wraps a source to mend what is known to be wrong with an archive.
 
 pub mod adapt;
+mod catalogue;
 mod container;
-pub mod files;
+mod files;
 mod pictures;
 pub mod views;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use btfkit_formats::bonn::RowOrder;
+use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
 
-use crate::error::Result;
-use adapt::Adaptation;
+use crate::error::{Error, Result};
 use crate::run::Context;
+use adapt::Adaptation;
+
+/// Bytes that tell one container from another.
+const HEAD_BYTES: u64 = 4096;
 
 /// A measurement that can be read image by image.
 pub trait Source: Send + Sync {
@@ -40,15 +46,46 @@ pub trait Source: Send + Sync {
     fn check(&self, context: &Context<'_>) -> Result<String>;
 }
 
-/// Recognises and opens an archive: the files at one path, or the pieces at several.
-pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
-    let source = Box::new(pictures::Pictures::open(paths, Limits::default())?);
-    adapt::adapt(source, &options.adaptation)
-}
-
 /// What a reader is told because the archive does not say it, or says it wrong.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// What is mended.
     pub adaptation: Adaptation,
+    /// Where the angles stand in the names of pictures.
+    pub pattern: Option<String>,
+    /// A table of files and their directions.
+    pub table: Option<PathBuf>,
+    /// The directions of an archive that has none: a published list or order by its name.
+    pub order: Option<String>,
+    /// Row order of Bonn containers.
+    pub rows: RowOrder,
+    /// How Radiance pictures are read whose scan lines are columns.
+    pub hdr_orientation: HdrOrientation,
+}
+
+/// Recognises and opens an archive: the file or folder at one path, or the pieces at several.
+///
+/// # Errors
+/// Says what was found where nothing is recognised.
+pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
+    let limits = Limits::default();
+    let mut adaptation = options.adaptation.clone();
+    let single = match paths {
+        [path] if path.is_file() => container::recognise(path, options, &limits)?,
+        _ => None,
+    };
+    let source: Box<dyn Source> = match single {
+        Some(recognised) => {
+            // Databases of display values come from 8-bit images.
+            adaptation.samples = adaptation.samples.or(recognised.samples);
+            recognised.source
+        }
+        None => Box::new(pictures::Pictures::open(paths, options, limits)?),
+    };
+    adapt::adapt(source, &adaptation)
+}
+
+/// The bytes of a small file beside an archive.
+fn read_beside(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|error| Error::io("read", path, error))
 }

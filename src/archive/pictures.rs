@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use btfkit_formats::ubo2003::Catalogue;
-use btfkit_formats::{Contents, Direction, Limits, SampleType, Samples, jpeg};
+use btfkit_formats::picture::{self, DecodeOptions};
+use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
 use rayon::prelude::*;
 
-use super::Source;
+use super::catalogue::{self, Found};
 use super::files::Files;
+use super::{Options, Source};
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 
@@ -23,43 +23,45 @@ pub(super) struct Pictures {
     /// File of each image, [view, light].
     images: Vec<usize>,
     contents: Contents,
+    decoding: DecodeOptions,
     limits: Limits,
 }
 
 impl Pictures {
-    pub(super) fn open(paths: &[PathBuf], limits: Limits) -> Result<Self> {
+    pub(super) fn open(paths: &[PathBuf], options: &Options, limits: Limits) -> Result<Self> {
         let path = paths.first().cloned().unwrap_or_default();
         let files = Files::list(paths, &limits)?;
-        let catalogue = Catalogue::from_names(files.names()).map_err(|errors| {
-            Error::input(errors.to_string()).context(path.display()).hint(
-                "expected one JPEG for each pair of directions, named like `00081 tl015 pl000 tv000 pv000.jpg`",
-            )
-        })?;
-        let direction = |a: &btfkit_formats::ubo2003::Angles| Direction::from_degrees(a.theta_deg(), a.phi_deg());
-        let views: Vec<Direction> = catalogue.views().iter().map(direction).collect();
-        let lights: Vec<Direction> = catalogue.lights().iter().map(direction).collect();
+        let Found { catalogue, format, mut assumptions } = catalogue::find(&path, &files, options, &limits)?;
+        let directions = |angles: &[Angles]| angles.iter().map(|a| a.direction()).collect::<Vec<_>>();
+        let (views, lights) = (directions(catalogue.views()), directions(catalogue.lights()));
         let images: Vec<usize> = (0..views.len())
             .flat_map(|view| (0..lights.len()).map(move |light| (view, light)))
             .filter_map(|(view, light)| catalogue.image(view, light))
             .collect();
         let first = images.first().copied().ok_or_else(|| Error::input("no images"))?;
-        let header = jpeg::header(&files.bytes(first)?, &limits)
+        let header = picture::header(&files.bytes(first)?, &limits)
             .map_err(|error| Error::from(error.in_entry(files.name(first))).context(path.display()))?;
-        let channels: &[&str] = if header.channels == 1 { &["Y"] } else { &["R", "G", "B"] };
+        if !header.linear {
+            assumptions.push("the pictures' transfer curve is sRGB".to_owned());
+        }
+        if header.scanlines_are_columns {
+            assumptions.push(format!("scan lines that are columns: read as {:?}", options.hdr_orientation));
+        }
         let contents = Contents {
-            format: "UBO2003 layout".to_owned(),
+            format,
             width: header.width,
             height: header.height,
-            channels: channels.iter().map(ToString::to_string).collect(),
-            sample_type: SampleType::U8,
+            channels: header.channels,
+            sample_type: header.sample_type,
             views,
             lights,
-            linear: false,
+            linear: header.linear,
             cosine_included: true,
-            assumptions: vec!["the transfer curve is sRGB".to_owned()],
+            assumptions,
             remarks: vec![("other files".to_owned(), catalogue.ignored().to_string())],
         };
-        Ok(Self { path, files, images, contents, limits })
+        let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
+        Ok(Self { path, files, images, contents, decoding, limits })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -70,31 +72,35 @@ impl Pictures {
     fn check_image(&self, file: usize) -> Result<u32> {
         let bytes = self.files.bytes(file)?;
         let checksum = self.files.checksum(file, &bytes);
-        let found = jpeg::check(&bytes, &self.limits).map_err(|error| error.in_entry(self.files.name(file)))?;
-        let shape = (found.width, found.height, usize::from(found.channels));
-        self.expect_shape(file, shape)?;
+        let found =
+            picture::check(&bytes, &self.limits).map_err(|error| error.in_entry(self.files.name(file)))?;
+        self.expect_like_first(file, (found.width, found.height, &found.channels, found.sample_type))?;
         Ok(checksum)
     }
 
-    fn expect_shape(&self, file: usize, (width, height, channels): (u32, u32, usize)) -> Result<()> {
-        let expected = (self.contents.width, self.contents.height, self.contents.channels.len());
-        if (width, height, channels) == expected {
+    fn expect_like_first(&self, file: usize, found: (u32, u32, &Vec<String>, SampleType)) -> Result<()> {
+        let Contents { width, height, channels, sample_type, .. } = &self.contents;
+        if found == (*width, *height, channels, *sample_type) {
             return Ok(());
         }
+        let told = |(width, height, channels, sample_type): (u32, u32, &Vec<String>, SampleType)| {
+            format!("{width}x{height} of {} {}", channels.join(" "), sample_type.name())
+        };
         Err(Error::input(format!(
-            "{}: got {width}x{height} with {channels} channels, expected {}x{} with {} like the first image",
+            "{}: got {}, expected {} like the first image",
             self.files.name(file),
-            expected.0,
-            expected.1,
-            expected.2
+            told(found),
+            told((*width, *height, channels, *sample_type))
         )))
     }
 
     fn decode(&self, file: usize) -> Result<Samples> {
         let bytes = self.files.bytes(file)?;
-        let image = jpeg::decode(&bytes, &self.limits).map_err(|error| error.in_entry(self.files.name(file)))?;
-        self.expect_shape(file, (image.width, image.height, usize::from(image.channels)))?;
-        Ok(Samples::U8(image.samples))
+        let image = picture::decode_with(&bytes, &self.decoding, &self.limits)
+            .map_err(|error| error.in_entry(self.files.name(file)))?;
+        let found = (image.width, image.height, &image.channels, image.samples.sample_type());
+        self.expect_like_first(file, found)?;
+        Ok(image.samples)
     }
 }
 
@@ -131,7 +137,6 @@ impl Source for Pictures {
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
-        let done = AtomicUsize::new(0);
         let checked: Vec<Result<u32>> = context.install(|| {
             self.images
                 .par_iter()
@@ -139,7 +144,6 @@ impl Source for Pictures {
                     context.check_stop()?;
                     let checksum = self.check_image(file);
                     self.files.release(file);
-                    done.fetch_add(1, Ordering::Relaxed);
                     checksum
                 })
                 .collect()

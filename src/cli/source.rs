@@ -6,6 +6,8 @@ use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
 use btfkit::archive::{self, Source};
 use btfkit::color::Transfer;
 use btfkit::error::Result;
+use btfkit_formats::bonn::RowOrder;
+use btfkit_formats::picture::HdrOrientation;
 use clap::{Args, ValueEnum};
 
 /// How to read an archive that does not say everything, or says it wrong.
@@ -33,6 +35,21 @@ pub(super) struct SourceArgs {
     /// `excluded`: the cosine of the light angle is not in the values, so multiply it in
     #[arg(long, value_parser = ["excluded"])]
     cosine: Option<String>,
+    /// Where the angles stand in file names, such as '{theta_v}_{phi_v}_{theta_i}_{phi_i}.exr'
+    #[arg(long, value_name = "TEXT")]
+    pattern: Option<String>,
+    /// A CSV table with the columns file, theta_i, phi_i, theta_v, phi_v (degrees)
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    /// Directions of an array, or the order of a BIG or MIF file, that has none of its own
+    #[arg(long, value_parser = ["ubo81", "bonn151", "uniform"])]
+    order: Option<String>,
+    /// `reversed`: rows of a Bonn container begin with the bottom one
+    #[arg(long, value_parser = ["reversed"])]
+    rows: Option<String>,
+    /// `atrium`: scan lines of Radiance pictures that name X first are rows, from the bottom up
+    #[arg(long, value_parser = ["rules", "atrium"])]
+    hdr: Option<String>,
     /// Leave out a view, by its number in the archive; may be given several times
     #[arg(long, value_name = "N")]
     drop_view: Vec<usize>,
@@ -61,7 +78,17 @@ enum Azimuth {
 
 impl SourceArgs {
     pub(super) fn options(&self) -> archive::Options {
-        archive::Options { adaptation: self.adaptation() }
+        archive::Options {
+            adaptation: self.adaptation(),
+            pattern: self.pattern.clone(),
+            table: self.table.clone(),
+            order: self.order.clone(),
+            rows: if self.rows.is_some() { RowOrder::BottomFirst } else { RowOrder::TopFirst },
+            hdr_orientation: match self.hdr.as_deref() {
+                Some("atrium") => HdrOrientation::Atrium,
+                _ => HdrOrientation::Rules,
+            },
+        }
     }
 
     fn adaptation(&self) -> Adaptation {

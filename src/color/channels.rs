@@ -3,6 +3,7 @@
 //! R, G, B and one grey channel are taken as they are; X, Y, Z and wavelengths go through the CIE 1931 2 degree
 //! observer, wavelengths as reflectances under D65.
 
+use btfkit_formats::picture::wavelength_nm;
 use btfkit_formats::{SampleType, Samples};
 
 use super::{LUMINANCE_WEIGHTS, Transfer};
@@ -68,12 +69,6 @@ pub fn weights(channels: &[String]) -> Result<Weights> {
             channels.join(", ")
         ))),
     }
-}
-
-/// The wavelength that a channel's name tells, nanometres.
-fn wavelength_nm(name: &str) -> Option<f64> {
-    let digits = name.trim().trim_end_matches("nm").trim();
-    digits.parse().ok().filter(|nm: &f64| (100.0..=1e5).contains(nm))
 }
 
 /// Weights of reflectances at wavelengths: linear between them, constant beyond, under D65.

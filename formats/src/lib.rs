@@ -46,17 +46,20 @@
     )
 )]
 
+pub mod big;
 mod contents;
 mod direction;
 mod error;
 pub mod jpeg;
 mod limits;
+pub mod mif;
 pub mod mlvq;
 pub mod picture;
 mod reader;
 mod request;
 mod samples;
 pub mod ubo2003;
+pub mod utia;
 pub mod zip;
 
 pub use contents::{Contents, Images};

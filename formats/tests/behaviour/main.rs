@@ -6,6 +6,7 @@
     clippy::print_stdout // the test on real files says whether it found any
 )]
 
+mod big;
 mod catalogue;
 mod damage;
 mod jpeg;
@@ -13,5 +14,6 @@ mod measured_files;
 mod mlvq;
 mod mlvq_files;
 mod support;
+mod utia_files;
 mod zip_reading;
 mod zip_writing;

@@ -11,6 +11,7 @@ mod catalogue;
 mod damage;
 mod jpeg;
 mod measured_files;
+mod mif;
 mod mlvq;
 mod mlvq_files;
 mod support;

@@ -49,6 +49,7 @@
 mod angles;
 mod catalogue;
 pub mod bonn;
+pub mod big;
 mod contents;
 mod direction;
 pub mod directions;
@@ -59,6 +60,8 @@ pub mod jpeg;
 mod limits;
 pub mod named;
 pub mod npy;
+pub mod mif;
+pub mod mlvq;
 pub mod picture;
 mod reader;
 pub mod rti;
@@ -67,6 +70,7 @@ mod request;
 mod samples;
 pub mod table;
 pub mod ubo2003;
+pub mod utia;
 pub mod zip;
 
 pub use angles::Angles;

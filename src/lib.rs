@@ -14,6 +14,7 @@ pub mod archive;
 pub mod color;
 pub mod demo;
 pub mod error;
+pub mod hdf5;
 pub mod kernel;
 pub mod mrf;
 pub mod picture;

@@ -57,7 +57,9 @@ impl Writer {
             )));
         }
         let temporary = mapped::temporary_name(path);
-        let file = File::create_excl(&temporary).map_err(|error| cannot_write(path, &error))?;
+        // The newer layout of metadata has checksums throughout; the older one has none, and the C library believes it.
+        let builder = File::with_options().with_fapl(|access| access.libver_v110()).clone();
+        let file = builder.create_excl(&temporary).map_err(|error| cannot_write(path, &error))?;
         let mut writer = Self {
             path: path.to_owned(),
             temporary,
@@ -207,7 +209,9 @@ impl Drop for Writer {
 
 fn write_directions(file: &File, which: usize, directions: &[Direction]) -> hdf5::Result<()> {
     let angles: Vec<f64> = directions.iter().flat_map(|d| [d.theta_rad, d.phi_rad]).collect();
-    let dataset = file.new_dataset::<f64>().shape([directions.len(), 2]).create(DIRECTIONS[which])?;
+    let shape = [directions.len(), 2];
+    // In a chunk, for the sake of a checksum.
+    let dataset = file.new_dataset::<f64>().shape(shape).chunk(shape).fletcher32().create(DIRECTIONS[which])?;
     dataset.write(ArrayView2::from_shape((directions.len(), 2), &angles)?)?;
     attribute::write(&dataset, "units", &"rad".into())?;
     attribute::write_texts(&dataset, "angles", &["theta", "phi"])?;

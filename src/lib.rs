@@ -15,6 +15,7 @@ pub mod color;
 pub mod demo;
 pub mod error;
 pub mod factor;
+pub mod hdf5;
 pub mod kernel;
 pub mod mrf;
 pub mod picture;

@@ -9,6 +9,9 @@ mod determinism;
 mod equations;
 #[path = "behaviour/fixture.rs"]
 mod fixture;
+#[cfg(feature = "hdf5")]
+#[path = "behaviour/hdf5.rs"]
+mod hdf5;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
 #[path = "behaviour/pictures.rs"]

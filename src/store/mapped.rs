@@ -75,23 +75,31 @@ impl MappedStorage {
 
 /// Writes `bytes` to `path` so that it appears whole or not at all, also after a power failure.
 fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     // A folder that is made now has to reach the disk as an entry of its parent.
     let made: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.exists()).collect();
     fs::create_dir_all(folder)?;
     let temporary = temporary_name(path);
-    let written = File::create_new(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        file.sync_all()
-    });
-    if let Err(error) = written.and_then(|()| fs::rename(&temporary, path)) {
+    let written = File::create_new(&temporary).and_then(|mut file| file.write_all(bytes));
+    if let Err(error) = written.and_then(|()| publish(&temporary, path)) {
         let _ = fs::remove_file(&temporary);
         return Err(error);
     }
-    File::open(folder)?.sync_all()?;
     made.iter().filter_map(|folder| folder.parent()).try_for_each(|parent| {
         File::open(if parent.as_os_str().is_empty() { Path::new(".") } else { parent })?.sync_all()
     })
+}
+
+/// Gives a file that is written its final name, beside it, so that it is there whole after a power failure.
+pub(crate) fn publish(temporary: &Path, path: &Path) -> io::Result<()> {
+    File::open(temporary)?.sync_all()?;
+    fs::rename(temporary, path)?;
+    File::open(folder_of(path))?.sync_all()
+}
+
+/// The folder that a file lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// [`write_atomically`] with an error that names the file.

@@ -8,8 +8,8 @@ use btfkit::kernel::absolute_difference::Kernel;
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
-use btfkit_formats::Direction;
 use btfkit::texel::nearest::{NearestNormals, Neighbour};
+use btfkit_formats::Direction;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 

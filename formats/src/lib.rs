@@ -47,9 +47,9 @@
 )]
 
 mod angles;
-mod catalogue;
-pub mod bonn;
 pub mod big;
+pub mod bonn;
+mod catalogue;
 mod contents;
 mod direction;
 pub mod directions;
@@ -58,15 +58,14 @@ mod fields;
 mod file_name;
 pub mod jpeg;
 mod limits;
-pub mod named;
-pub mod npy;
 pub mod mif;
 pub mod mlvq;
+pub mod named;
+pub mod npy;
 pub mod picture;
 mod reader;
-pub mod rti;
-pub mod mlvq;
 mod request;
+pub mod rti;
 mod samples;
 pub mod table;
 pub mod ubo2003;

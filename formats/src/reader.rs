@@ -70,8 +70,4 @@ impl<'a> Reader<'a> {
     pub(crate) fn f32_le(&mut self) -> Result<f32> {
         Ok(f32::from_le_bytes(self.array()?))
     }
-
-    pub(crate) fn f64_le(&mut self) -> Result<f64> {
-        Ok(f64::from_le_bytes(self.array()?))
-    }
 }

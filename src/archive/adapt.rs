@@ -89,7 +89,8 @@ pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<B
         std::mem::swap(&mut views, &mut lights);
     }
     if let Some(&beyond) = adaptation.drop_views.iter().find(|&&view| view >= views.len()) {
-        let found = format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
+        let found =
+            format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
         return Err(Error::input(found));
     }
     let kept: Vec<usize> = (0..views.len()).filter(|view| !adaptation.drop_views.contains(view)).collect();
@@ -101,7 +102,8 @@ pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<B
         let phi = if mirrored { -direction.phi_rad } else { direction.phi_rad };
         Direction { phi_rad: (phi + turn).rem_euclid(std::f64::consts::TAU), ..*direction }
     };
-    let mirrored = |one| matches!(adaptation.mirrored, Some(found) if found == Mirrored::Both || found == one);
+    let mirrored =
+        |one| matches!(adaptation.mirrored, Some(found) if found == Mirrored::Both || found == one);
     contents.views = kept.iter().map(|&view| turned(&views[view], mirrored(Mirrored::Views))).collect();
     contents.lights = lights.iter().map(|light| turned(light, mirrored(Mirrored::Lights))).collect();
     if adaptation.transpose {
@@ -113,7 +115,14 @@ pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<B
     contents.sample_type = wanted;
     contents.cosine_included = true;
     let cosines = cosine.then(|| contents.lights.iter().map(|light| light.vector()[2]).collect());
-    Ok(Box::new(Adapted { inner, contents, kept, swap: adaptation.swap, transpose: adaptation.transpose, cosines }))
+    Ok(Box::new(Adapted {
+        inner,
+        contents,
+        kept,
+        swap: adaptation.swap,
+        transpose: adaptation.transpose,
+        cosines,
+    }))
 }
 
 struct Adapted {
@@ -210,7 +219,8 @@ mod tests {
     struct Made(Contents);
 
     fn made(cosine_included: bool) -> Box<dyn Source> {
-        let directions = |n: u32| (0..n).map(|k| Direction::from_degrees(60.0, 30.0 * f64::from(k))).collect();
+        let directions =
+            |n: u32| (0..n).map(|k| Direction::from_degrees(60.0, 30.0 * f64::from(k))).collect();
         Box::new(Made(Contents {
             format: "made".to_owned(),
             width: 3,
@@ -272,8 +282,7 @@ mod tests {
 
     #[test]
     fn images_are_transposed_and_converted() {
-        let adaptation =
-            Adaptation { transpose: true, samples: Some(Type::F32), ..Adaptation::default() };
+        let adaptation = Adaptation { transpose: true, samples: Some(Type::F32), ..Adaptation::default() };
         let source = adapt(made(true), &adaptation).unwrap();
         assert_eq!((source.contents().width, source.contents().height), (2, 3));
         let found = source.read_images(0, 1..2).unwrap();

@@ -108,9 +108,8 @@ fn match_files(list: &Path, files: &Files, rows: Vec<(&str, Pair)>) -> Result<Ve
             let mut ends = files.names().enumerate().filter(|(_, name)| Path::new(name).ends_with(file));
             ends.next().filter(|_| ends.next().is_none()).map(|(number, _)| number)
         });
-        let number = number.ok_or_else(|| {
-            Error::input(format!("{}: lists {file:?}, which is not there", list.display()))
-        })?;
+        let number = number
+            .ok_or_else(|| Error::input(format!("{}: lists {file:?}, which is not there", list.display())))?;
         pairs[number] = Some(pair);
     }
     Ok(pairs)
@@ -118,7 +117,8 @@ fn match_files(list: &Path, files: &Files, rows: Vec<(&str, Pair)>) -> Result<Ve
 
 /// Pictures in the order of their names are the lights of a list without names.
 fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<Vec<Option<Pair>>> {
-    let mut pictures: Vec<usize> = (0..files.len()).filter(|&number| is_picture(files.name(number))).collect();
+    let mut pictures: Vec<usize> =
+        (0..files.len()).filter(|&number| is_picture(files.name(number))).collect();
     pictures.sort_by_key(|&number| files.name(number));
     if pictures.len() != lights.len() {
         return Err(Error::input(format!(

@@ -4,7 +4,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::npy::{self, Beside};
-use btfkit_formats::{Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq};
+use btfkit_formats::utia::Order;
+use btfkit_formats::{
+    Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
+};
 use sha2::{Digest, Sha256};
 
 use super::adapt::Type;
@@ -67,11 +70,15 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
 }
 
 /// The order of images that the user names for a BIG or MIF file.
-fn order(options: &Options) -> Result<btfkit_formats::Order> {
-    let Some(name) = &options.order else { return Ok(btfkit_formats::Order::default()) };
-    btfkit_formats::Order::published(name).ok_or_else(|| {
-        Error::new(crate::Kind::Usage, format!("got the order {name:?}, expected ubo81 or uniform"))
-    })
+fn order(options: &Options) -> Result<Order> {
+    match options.order.as_deref() {
+        None => Ok(Order::Stated),
+        Some("ubo81") => Ok(Order::Ubo81),
+        Some("uniform") => Ok(Order::Uniform),
+        Some(name) => {
+            Err(Error::new(crate::Kind::Usage, format!("got the order {name:?}, expected ubo81 or uniform")))
+        }
+    }
 }
 
 /// What is known of the ambiguous bytes of a database, from `zero_bytes.txt` in its folder.
@@ -123,7 +130,11 @@ impl Container {
         let images = open(file.as_ref()).map_err(|error| {
             let missing = error.kind() == ErrorKind::Argument;
             let error = Error::from(error).context(path.display());
-            if missing { error.hint("--order names a published list of directions (ubo81, bonn151, uniform)") } else { error }
+            if missing {
+                error.hint("--order names a published list of directions (ubo81, bonn151, uniform)")
+            } else {
+                error
+            }
         })?;
         Ok(Self { path: path.to_owned(), file, images })
     }

@@ -14,7 +14,7 @@ use crate::store::mapped::MappedFile;
 const FOLDER_DEPTH: usize = 8;
 
 /// Files by name.
-pub struct Files {
+pub(super) struct Files {
     zips: Vec<Zip>,
     entries: Vec<Entry>,
 }
@@ -40,7 +40,7 @@ impl Files {
     ///
     /// # Errors
     /// Says where a zip is damaged.
-    pub fn list(paths: &[PathBuf], limits: &Limits) -> Result<Self> {
+    pub(super) fn list(paths: &[PathBuf], limits: &Limits) -> Result<Self> {
         let mut files = Self { zips: Vec::new(), entries: Vec::new() };
         for path in paths {
             // A light list stands for the pictures beside it.
@@ -80,27 +80,22 @@ impl Files {
     }
 
     /// Names of all files: as in their zip, or their paths.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.entries.iter().map(|entry| entry.name.as_str())
     }
 
     /// Number of files.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
-    }
-
     /// Name of a file.
-    pub fn name(&self, number: usize) -> &str {
+    pub(super) fn name(&self, number: usize) -> &str {
         self.entries.get(number).map_or("", |entry| &entry.name)
     }
 
     /// The bytes of a file.
-    pub fn bytes(&self, number: usize) -> Result<Cow<'_, [u8]>> {
+    pub(super) fn bytes(&self, number: usize) -> Result<Cow<'_, [u8]>> {
         match &self.entries[number].place {
             Place::Plain(path) => {
                 fs::read(path).map(Cow::Owned).map_err(|error| Error::io("read", path, error))
@@ -114,7 +109,7 @@ impl Files {
     }
 
     /// Gives back the memory of a file that has been used: pages of a mapped archive count as resident.
-    pub fn release(&self, number: usize) {
+    pub(super) fn release(&self, number: usize) {
         if let Place::Zipped { zip, entry } = self.entries[number].place
             && let Some(listed) = self.zips[zip].index.entries().get(entry)
         {
@@ -123,7 +118,7 @@ impl Files {
     }
 
     /// CRC-32 of a file whose bytes these are: the same in a zip, which has it listed, and in a folder.
-    pub fn checksum(&self, number: usize, bytes: &[u8]) -> u32 {
+    pub(super) fn checksum(&self, number: usize, bytes: &[u8]) -> u32 {
         match self.entries[number].place {
             Place::Zipped { zip, entry } => self.zips[zip].index.entries()[entry].crc32(),
             Place::Plain(_) => crc32fast::hash(bytes),
@@ -138,7 +133,7 @@ fn is_zip(path: &Path) -> Result<bool> {
 }
 
 /// The first bytes of a file, fewer where it is shorter.
-pub fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
+pub(super) fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
     use std::io::Read;
     let mut head = Vec::new();
     let file = fs::File::open(path).map_err(|error| Error::io("read", path, error))?;
@@ -147,7 +142,7 @@ pub fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
 }
 
 /// Files below a folder, sorted by path. Links to files are followed, links to folders are not.
-pub fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
+fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];
     while let Some((folder, depth)) = folders.pop() {

@@ -149,7 +149,8 @@ impl Source for Pictures {
                 .collect()
         });
         context.check_stop()?;
-        let problems: Vec<String> = checked.iter().filter_map(|c| Some(c.as_ref().err()?.to_string())).collect();
+        let problems: Vec<String> =
+            checked.iter().filter_map(|c| Some(c.as_ref().err()?.to_string())).collect();
         fail_on(&self.path, &problems)
             .map_err(|error| error.hint("replace these images and run the same command again"))?;
         let checksums: Vec<u8> = checked.into_iter().flatten().flat_map(u32::to_le_bytes).collect();

@@ -111,7 +111,8 @@ impl Import {
         let codec = match self.codec {
             CodecName::Stock => Codec::Stock,
         };
-        let options = import::Options { store: job.store.clone(), white: self.white, codec, shard: self.shard };
+        let options =
+            import::Options { store: job.store.clone(), white: self.white, codec, shard: self.shard };
         let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
             tell.plan(&plan.summary())?;
@@ -153,7 +154,14 @@ impl Import {
                 Ok(None) => {}
                 Err(error) if error.kind() == Kind::Stopped => return Err(error),
                 Err(error) => {
-                    rows.push(row![archive, store, "", "", "", format!("failed: {}", first_line(&error.to_string()))]);
+                    rows.push(row![
+                        archive,
+                        store,
+                        "",
+                        "",
+                        "",
+                        format!("failed: {}", first_line(&error.to_string()))
+                    ]);
                     worst.get_or_insert(error);
                 }
             }

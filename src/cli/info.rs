@@ -1,30 +1,68 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use btfkit::archive;
 use btfkit::error::Result;
-use btfkit::stage::{cluster, import};
+use btfkit::run::Context;
+use btfkit::stage::{cluster, estimate, import};
+use btfkit::store::chunk::Codec;
 use btfkit::store::Store;
 use btfkit::store::enlarged::{self, Enlarged};
-use btfkit::store::measurement::{self, Measurement};
+use btfkit::store::measurement::{self, Description, Measurement};
 use btfkit::store::model::{self, Model, Stage};
+use btfkit_formats::Direction;
 use clap::Args;
 use serde_json::Value;
 
+use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, bytes_text};
 
-/// Tell what an archive or a store holds and how far it is
+/// Tell what an archive or a store holds, how far it is, and how large the store of an archive will be
 #[derive(Args)]
+#[command(after_help = "\
+Archives are told apart by their content:
+  zips and folders of pictures (JPEG, PNG, TIFF, Radiance, OpenEXR) with angles in their names, a table or an .lp list;
+  Bonn .btf (DFMF, FMF, PVF, BDI); MLVQ databases; UTIA BIG and MIF; numpy arrays; HDF5.
+
+Examples:
+  btf info UBO_WOOD256.zip
+  btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
+  btf info wood.zarr")]
 pub(super) struct Info {
-    /// An archive or a store
-    path: PathBuf,
+    /// An archive, in pieces perhaps, or a store
+    #[arg(required = true, value_name = "PATH")]
+    paths: Vec<PathBuf>,
+    #[command(flatten)]
+    source: SourceArgs,
+}
+
+/// Rows that tell what a measurement, or an archive as a measurement, holds.
+fn described(description: &Description) -> Vec<Vec<String>> {
+    let directions = |list: &[Direction]| {
+        let thetas: Vec<f64> = list.iter().map(|d| d.degrees().0).collect();
+        let (low, high) = thetas.iter().fold((f64::MAX, f64::MIN), |(l, h), &t| (l.min(t), h.max(t)));
+        format!("{}, theta {low:.1} to {high:.1} degrees", list.len())
+    };
+    let channels = match description.channels.as_slice() {
+        [first, .., last] if description.n_channels() > 4 => {
+            format!("{} channels, {first} to {last}", description.n_channels())
+        }
+        names => names.join(" "),
+    };
+    vec![
+        row!["views", directions(&description.views)],
+        row!["lights", directions(&description.lights)],
+        row!["size", format!("{}, {channels}, {}", description.size, description.sample_type.name())],
+        row!["transfer", format!("{:?}", description.transfer).to_lowercase()],
+        row!["raw", bytes_text(description.bytes())],
+    ]
 }
 
 impl Info {
-    pub(super) fn run(&self, tell: Tell) -> Result<()> {
-        let store = self.path.join("zarr.json").exists();
-        let rows = match store.then(|| Store::at(&self.path).attributes()).transpose()?.flatten() {
-            None => self.archive()?,
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let path = self.path();
+        let store = path.join("zarr.json").exists();
+        let rows = match store.then(|| Store::at(path).attributes()).transpose()?.flatten() {
+            None => self.archive(context)?,
             Some(attributes) => match attributes.get("kind").and_then(Value::as_str) {
                 Some(measurement::KIND) => self.measurement()?,
                 Some(model::KIND) => self.model()?,
@@ -36,32 +74,38 @@ impl Info {
         Ok(())
     }
 
-    fn archive(&self) -> Result<Vec<Vec<String>>> {
-        let source = archive::open(std::slice::from_ref(&self.path), &archive::Options::default())?;
+    fn path(&self) -> &Path {
+        self.paths.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+
+    fn archive(&self, context: &Context<'_>) -> Result<Vec<Vec<String>>> {
+        let source = self.source.open(&self.paths)?;
         let contents = source.contents();
         let description = import::describe(source.as_ref(), 1.0);
-        Ok(vec![
-            row!["kind", format!("archive, {}", contents.format)],
-            row!["views x lights", format!("{} x {}", contents.views.len(), contents.lights.len())],
-            row!["raw", bytes_text(description.bytes())],
-        ])
+        let mut rows = vec![row!["kind", format!("archive, {}", contents.format)]];
+        rows.extend(described(&description));
+        for codec in [Codec::Stock] {
+            let bytes = estimate::store_bytes(source.as_ref(), codec, context)?;
+            rows.push(row![format!("store, about ({codec})"), bytes_text(bytes)]);
+        }
+        rows.extend(contents.remarks.iter().map(|(name, value)| row![name, value]));
+        rows.extend(contents.assumptions.iter().map(|assumption| row!["assumed", assumption]));
+        Ok(rows)
     }
 
     fn measurement(&self) -> Result<Vec<Vec<String>>> {
-        let measurement = Measurement::open(&self.path)?;
+        let measurement = Measurement::open(self.path())?;
         let description = measurement.description();
-        Ok(vec![
-            row!["kind", measurement::KIND],
-            row!["views x lights", format!("{} x {}", description.views.len(), description.lights.len())],
-            row!["size", format!("{}, {} channels", description.size, description.n_channels())],
-            row!["transfer", format!("{:?}", description.transfer).to_lowercase()],
-            row!["raw", bytes_text(description.bytes())],
-            row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())],
-        ])
+        let mut rows = vec![row!["kind", measurement::KIND]];
+        rows.extend(described(description));
+        rows.push(row!["white", description.white]);
+        rows.push(row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())]);
+        rows.extend(measurement.assumptions().iter().map(|assumption| row!["assumed", assumption]));
+        Ok(rows)
     }
 
     fn model(&self) -> Result<Vec<Vec<String>>> {
-        let model = Model::open(&self.path)?;
+        let model = Model::open(self.path())?;
         let mut rows = vec![row!["kind", model::KIND]];
         for stage in [Stage::Tile, Stage::Cluster, Stage::Normals, Stage::Fit] {
             let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
@@ -81,7 +125,7 @@ impl Info {
     }
 
     fn enlarged(&self) -> Result<Vec<Vec<String>>> {
-        let enlarged = Enlarged::open(&self.path)?;
+        let enlarged = Enlarged::open(self.path())?;
         let done = (0..enlarged.shard_rows()).filter(|&row| enlarged.has_shard_row(row)).count();
         Ok(vec![
             row!["kind", enlarged::KIND],

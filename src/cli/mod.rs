@@ -3,6 +3,7 @@
 mod analyse;
 mod demo;
 mod enlarge;
+mod export;
 mod image;
 mod import;
 mod info;
@@ -77,6 +78,7 @@ enum Command {
     Info(info::Info),
     Import(import::Import),
     Verify(verify::Verify),
+    Export(export::Export),
     Model(analyse::Whole),
     Tile(analyse::Tile),
     Cluster(analyse::Cluster),
@@ -126,9 +128,10 @@ impl Command {
         match self {
             Self::Demo(command) => command.run(context, tell),
             Self::Sample(command) => command.run(context, tell),
-            Self::Info(command) => command.run(tell),
+            Self::Info(command) => command.run(context, tell),
             Self::Import(command) => command.run(context, tell),
             Self::Verify(command) => command.run(context, tell),
+            Self::Export(command) => command.run(context, tell),
             Self::Model(command) => command.run(context, tell),
             Self::Tile(command) => command.run(context, tell),
             Self::Cluster(command) => command.run(context, tell),

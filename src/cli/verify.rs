@@ -33,8 +33,7 @@ pub(super) struct Verify {
 impl Verify {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         let measurement = Measurement::open(&self.store)?;
-        let source =
-            if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
+        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
         let report = verify::run(&measurement, source.as_deref(), context)?;
         if self.json {
             let report = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;

@@ -148,8 +148,8 @@ impl Decoder {
         } else {
             Vec::new()
         };
-        let plain = weights.rgb.len() == 1
-            || weights.rgb == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let plain =
+            weights.rgb.len() == 1 || weights.rgb == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Ok(Self { transfer, table, weights, plain })
     }
 

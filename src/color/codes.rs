@@ -49,12 +49,7 @@ impl LightnessCodes {
     ///
     /// # Errors
     /// Channels that are not understood.
-    pub fn new(
-        transfer: Transfer,
-        sample_type: SampleType,
-        channels: &[String],
-        white: f64,
-    ) -> Result<Self> {
+    pub fn new(transfer: Transfer, sample_type: SampleType, channels: &[String], white: f64) -> Result<Self> {
         let weights = weights(channels)?;
         let value = |sample: u16| match sample_type {
             SampleType::U8 => f64::from(sample) / 255.0,
@@ -190,7 +185,8 @@ mod tests {
 
     #[test]
     fn every_8_bit_colour_has_the_code_of_the_formula() {
-        let codes = LightnessCodes::new(Transfer::Srgb, SampleType::U8, &names(&["R", "G", "B"]), 1.0).unwrap();
+        let codes =
+            LightnessCodes::new(Transfer::Srgb, SampleType::U8, &names(&["R", "G", "B"]), 1.0).unwrap();
         let linear: Vec<f64> = (0..256).map(|s| Transfer::Srgb.decode(f64::from(s) / 255.0)).collect();
         let mut colours = Vec::new();
         for r in (0..=255u8).step_by(5) {
@@ -219,7 +215,8 @@ mod tests {
             ];
             for samples in lists {
                 let codes =
-                    LightnessCodes::new(Transfer::Linear, samples.sample_type(), &names(&["Y"]), white).unwrap();
+                    LightnessCodes::new(Transfer::Linear, samples.sample_type(), &names(&["Y"]), white)
+                        .unwrap();
                 let mut found = vec![0; samples.len()];
                 let remarkable = codes.fill(&samples, &mut found);
                 let exact: Vec<f64> = samples.to_f32().iter().map(|&v| f64::from(v) / white).collect();
@@ -242,7 +239,13 @@ mod tests {
         let remarkable = codes.fill(&samples, &mut found);
         assert_eq!(found, [0, 0, 0, 255, 0]);
         assert_eq!(remarkable, Remarkable { clipped: 1, not_finite: 3, negative: 2 });
-        let halves = Samples::F16(vec![f16::NAN, f16::from_f32(-1.0), f16::INFINITY, f16::from_f32(2.0), f16::NEG_INFINITY]);
+        let halves = Samples::F16(vec![
+            f16::NAN,
+            f16::from_f32(-1.0),
+            f16::INFINITY,
+            f16::from_f32(2.0),
+            f16::NEG_INFINITY,
+        ]);
         let codes = LightnessCodes::new(Transfer::Linear, SampleType::F16, &names(&["Y"]), 1.0).unwrap();
         assert_eq!(codes.fill(&halves, &mut found), remarkable);
         assert_eq!(found, [0, 0, 0, 255, 0]);

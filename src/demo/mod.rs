@@ -26,9 +26,9 @@ use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::sample::Kind;
 use crate::shape::Size;
+use crate::stage::import::Shard;
 use crate::stage::tile::Choice;
 use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
-use crate::stage::import::Shard;
 use crate::store::chunk::Codec;
 use crate::store::enlarged::Enlarged;
 use crate::store::mapped::write_file;
@@ -176,12 +176,8 @@ fn measure(
     let found = Measurement::open(store).is_ok_and(|m| m.views_done() == settings.directions);
     times.time("import", found, || {
         let source = archive::open(&[archive.to_owned()], &archive::Options::default())?;
-        let options = import::Options {
-            store: store.to_owned(),
-            white: 1.0,
-            codec: Codec::Stock,
-            shard: Shard::WHOLE,
-        };
+        let options =
+            import::Options { store: store.to_owned(), white: 1.0, codec: Codec::Stock, shard: Shard::WHOLE };
         import::plan(source.as_ref(), options, context)?.run(context).map(|_| ())
     })
 }

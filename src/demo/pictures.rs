@@ -17,8 +17,8 @@ use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::texel::companion::{Companion, companion, stands_at};
-use btfkit_formats::Direction;
 use crate::texel::tile::{Cut, Features, Tile, cut};
+use btfkit_formats::Direction;
 
 /// Pictures with a side above this are embedded as JPEG, smaller ones as PNG.
 const PNG_SIDE: usize = 512;

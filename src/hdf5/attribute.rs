@@ -82,7 +82,9 @@ impl<'a> Attributes<'a> {
         let fail = |error: hdf5::Error| self.error(name, error);
         let shape = attribute.space().map_err(fail)?.shape();
         if shape.len() != 1 || shape.iter().any(|&n| n > MAX_NAMES) {
-            return Err(self.error(name, format!("got the shape {shape:?}, expected up to {MAX_NAMES} names")));
+            return Err(
+                self.error(name, format!("got the shape {shape:?}, expected up to {MAX_NAMES} names"))
+            );
         }
         let texts: Vec<Vec<u8>> = match kind {
             TypeDescriptor::FixedUnicode(n) if n <= MAX_NAME_BYTES => {
@@ -121,7 +123,10 @@ pub(super) fn write(location: &Location, name: &str, value: &Value) -> std::resu
 
 fn write_text(location: &Location, name: &str, text: &str) -> std::result::Result<(), hdf5::Error> {
     let held: FixedUnicode<MAX_TEXT_BYTES> = text.parse().map_err(|_| {
-        hdf5::Error::from(format!("attribute {name} has {} bytes, expected at most {MAX_TEXT_BYTES}", text.len()))
+        hdf5::Error::from(format!(
+            "attribute {name} has {} bytes, expected at most {MAX_TEXT_BYTES}",
+            text.len()
+        ))
     })?;
     let kind = TypeDescriptor::FixedUnicode(text.len().max(1));
     location.new_attr_builder().empty_as(&kind).create(name)?.write_scalar(&held)

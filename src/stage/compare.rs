@@ -114,12 +114,11 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                 let (measured, modelled) = (at * texel + sample, start + sample);
                 let code = codes.code(&window, measured);
                 sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
-                sums.squares += (0..channels).map(|c| difference(measured + c, modelled + c).powi(2)).sum::<f64>();
+                sums.squares +=
+                    (0..channels).map(|c| difference(measured + c, modelled + c).powi(2)).sum::<f64>();
                 if number % stride == 0 {
-                    let [a, b] = [
-                        decoder.rgb(&window, measured),
-                        decoder.rgb(&representatives.samples, modelled),
-                    ];
+                    let [a, b] =
+                        [decoder.rgb(&window, measured), decoder.rgb(&representatives.samples, modelled)];
                     sums.colour += ciede2000(lab(a), lab(b));
                     sums.colour_count += 1;
                 }

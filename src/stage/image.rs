@@ -12,10 +12,10 @@ use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model};
-use btfkit_formats::Direction;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
+use btfkit_formats::Direction;
 
 /// Rows of a measurement read at a time: a row of chunks.
 const BAND_ROWS: usize = 16;

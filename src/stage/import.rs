@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use btfkit_formats::{Direction, Samples};
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::archive::Source;
 use crate::color::{Remarkable, Transfer};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
@@ -16,7 +17,6 @@ use crate::shape::Size;
 use crate::store::chunk::Codec;
 use crate::store::gather::Images;
 use crate::store::measurement::{Description, Measurement, Origin};
-use btfkit_formats::Direction;
 
 /// Views in flight: one is written while the next is decoded; the threads share the work of each.
 const VIEWS_IN_FLIGHT: usize = 2;
@@ -167,32 +167,37 @@ impl Plan<'_> {
     /// Imports the views that are not in the store yet.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let contents = self.source.contents();
-        let origin = Origin {
-            recipe: &self.recipe,
-            assumptions: &contents.assumptions,
-            remarks: &contents.remarks,
-        };
+        let origin =
+            Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
         let store = &self.options.store;
         let measurement = Measurement::create(store, self.description.clone(), self.options.codec, &origin)?;
-        let (found, missing): (Vec<usize>, Vec<usize>) = self.views().partition(|&view| measurement.has_view(view));
+        let (found, missing): (Vec<usize>, Vec<usize>) =
+            self.views().partition(|&view| measurement.has_view(view));
         context.progress.begin("import", self.images(), Counted::Items("images"));
         context.progress.advance((found.len() * self.description.lights.len()) as u64);
         let codes = self.description.codes()?;
         let in_flight = units::in_flight(context, self.unit_bytes()).min(VIEWS_IN_FLIGHT);
+        let Description { size, sample_type, .. } = self.description;
+        let channels = self.description.n_channels();
         let results = units::for_each(context, &missing, in_flight, |&view| {
-            Ok(match self.read_view(view, context)? {
-                Ok(images) => {
-                    (context.install(|| measurement.write_view(view, &images, &codes))?, Vec::new())
-                }
-                Err(problems) => (Remarkable::default(), problems),
-            })
+            // A broken image does not keep the others from being looked at: all are named at the end.
+            match context.install(|| read_view(self.source, view, context)) {
+                Err(error) if error.kind() == Kind::Input => Ok(Err(error.to_string())),
+                Err(error) => Err(error),
+                Ok(images) => context.install(|| {
+                    let images = Images::new(size, channels, sample_type, images)?;
+                    measurement.write_view(view, &images, &codes).map(Ok)
+                }),
+            }
         })?;
         context.progress.end();
         let mut samples = Remarkable::default();
         let mut problems = Vec::new();
-        for (found, more) in results {
-            samples += found;
-            problems.extend(more);
+        for result in results {
+            match result {
+                Ok(found) => samples += found,
+                Err(problem) => problems.push(problem),
+            }
         }
         if !problems.is_empty() {
             return Err(Error::input(problems.join("\n"))
@@ -200,38 +205,39 @@ impl Plan<'_> {
         }
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
+}
 
-    /// The images of a view, or what is wrong with them.
-    fn read_view(&self, view: usize, context: &Context<'_>) -> Result<std::result::Result<Images, Vec<String>>> {
-        let lights = self.description.lights.len();
-        let step = self.source.lights_at_once().clamp(1, lights);
-        let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
-        let read: Vec<_> = context.install(|| {
-            groups
-                .into_par_iter()
-                .map(|group| {
-                    context.check_stop()?;
-                    let samples = self.source.read_images(view, group.clone());
-                    context.progress.advance(group.len() as u64);
-                    samples.map(|samples| (group, samples))
-                })
-                .collect()
-        });
-        context.check_stop()?;
-        let (mut images, mut problems) = (Vec::new(), Vec::new());
-        for group in read {
-            match group {
-                Ok(group) => images.push(group),
-                Err(error) if error.kind() == crate::Kind::Input => problems.push(error.to_string()),
-                Err(error) => return Err(error),
-            }
+/// Groups of images of a view: lights, and their samples [light, y, x, channel].
+pub(crate) type Groups = Vec<(std::ops::Range<usize>, Samples)>;
+
+/// The images of a view, read on the threads of the pool that this is called in.
+///
+/// # Errors
+/// Names every unusable image of the view.
+pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>) -> Result<Groups> {
+    let lights = source.contents().lights.len();
+    let step = source.lights_at_once().clamp(1, lights);
+    let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
+    let read: Vec<_> = groups
+        .into_par_iter()
+        .map(|group| {
+            context.check_stop()?;
+            let samples = source.read_images(view, group.clone());
+            context.progress.advance(group.len() as u64);
+            samples.map(|samples| (group, samples))
+        })
+        .collect();
+    context.check_stop()?;
+    let mut problems = Vec::new();
+    let mut images = Vec::new();
+    for group in read {
+        match group {
+            Ok(group) => images.push(group),
+            Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
+            Err(error) => return Err(error),
         }
-        if !problems.is_empty() {
-            return Ok(Err(problems));
-        }
-        let Description { size, sample_type, .. } = self.description;
-        Ok(Ok(Images::new(size, self.description.n_channels(), sample_type, images)?))
     }
+    if problems.is_empty() { Ok(images) } else { Err(Error::input(problems.join("\n"))) }
 }
 
 /// The store that an archive goes to where none is named: its name with `.zarr`, in a folder.

@@ -3,6 +3,8 @@
 pub mod cluster;
 pub mod compare;
 pub mod enlarge;
+pub mod estimate;
+pub mod export;
 pub mod fit;
 pub mod image;
 pub mod import;

@@ -97,10 +97,8 @@ impl Plan {
         let (texel, channels) = (description.texel_samples(), description.n_channels());
         let decoder = description.decoder()?;
         let normal = |samples: &Samples, at: usize| {
-            let intensities: Vec<f64> = (at..at + texel)
-                .step_by(channels)
-                .map(|sample| decoder.luminance(samples, sample))
-                .collect();
+            let intensities: Vec<f64> =
+                (at..at + texel).step_by(channels).map(|sample| decoder.luminance(samples, sample)).collect();
             if self.robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
         };
         let mut normals = Vec::with_capacity(window.size.texels());

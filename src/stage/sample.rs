@@ -1,7 +1,5 @@
 //! A synthetic measurement in UBO2003's layout, so that everything after it starts from an archive.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::PathBuf;
 
 use btfkit_formats::jpeg::{EncodeOptions, encode};
@@ -15,7 +13,7 @@ use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::sample::{Kind, Scene, Surface};
 use crate::shape::Size;
-use crate::store::mapped::temporary_name;
+use crate::store::output;
 
 /// What to make.
 #[derive(Clone, Debug)]
@@ -83,13 +81,8 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));
     let scene = context.install(|| Scene::new(surface, &light_angles));
 
-    let temporary = temporary_name(&options.archive);
-    let failed = |error| Error::io("write", &options.archive, error);
-    if let Some(folder) = options.archive.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
-    }
-    let written = File::create(&temporary).map_err(failed).and_then(|file| {
-        let mut zip = ZipWriter::new(BufWriter::new(file));
+    output::write_whole(&options.archive, |output| {
+        let mut zip = ZipWriter::new(output);
         for (number, view) in views.iter().enumerate() {
             context.check_stop()?;
             let images = context.install(|| {
@@ -111,17 +104,12 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                     .map_err(|error| Error::from(error).context(options.archive.display()))?;
             }
         }
-        let mut file = zip.finish().map_err(|error| Error::from(error).context(options.archive.display()))?;
-        file.flush().map_err(failed)?;
-        file.get_ref().sync_all().map_err(failed)
-    });
-    written.and_then(|()| std::fs::rename(&temporary, &options.archive).map_err(failed)).inspect_err(
-        |_| {
-            let _ = std::fs::remove_file(&temporary);
-        },
-    )?;
+        zip.finish().map_err(|error| Error::from(error).context(options.archive.display()))?;
+        Ok(())
+    })?;
     context.progress.end();
-    let bytes = std::fs::metadata(&options.archive).map_err(failed)?.len();
+    let bytes = std::fs::metadata(&options.archive);
+    let bytes = bytes.map_err(|error| Error::io("read", &options.archive, error))?.len();
     Ok(Report { images: views.len() * lights.len(), bytes })
 }
 
@@ -129,8 +117,8 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use btfkit_formats::Direction;
     use crate::texel::stereo::Stereo;
+    use btfkit_formats::Direction;
 
     #[test]
     fn any_number_of_directions_is_distinct_and_from_seven_on_they_span_space() {

@@ -66,7 +66,12 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
         if let Some(source) = source.filter(|_| damaged.is_empty()) {
             let lights = 0..description.lights.len();
             let samples = source.read_images(view, lights.clone())?;
-            let expected = Images::new(description.size, description.n_channels(), description.sample_type, vec![(lights, samples)])?;
+            let expected = Images::new(
+                description.size,
+                description.n_channels(),
+                description.sample_type,
+                vec![(lights, samples)],
+            )?;
             let (count, lights) = compare(measurement, view, &expected)?;
             different.fetch_add(count, Ordering::Relaxed);
             images.extend(lights.into_iter().map(|light| (view, light)));
@@ -92,8 +97,22 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
 
 fn expect_same_shape(measurement: &Measurement, source: &dyn Source) -> Result<()> {
     let (description, contents) = (measurement.description(), source.contents());
-    let found = (contents.width as usize, contents.height as usize, contents.channels.len(), contents.views.len(), contents.lights.len(), contents.sample_type);
-    let expected = (description.size.width, description.size.height, description.n_channels(), description.views.len(), description.lights.len(), description.sample_type);
+    let found = (
+        contents.width as usize,
+        contents.height as usize,
+        contents.channels.len(),
+        contents.views.len(),
+        contents.lights.len(),
+        contents.sample_type,
+    );
+    let expected = (
+        description.size.width,
+        description.size.height,
+        description.n_channels(),
+        description.views.len(),
+        description.lights.len(),
+        description.sample_type,
+    );
     if found == expected {
         return Ok(());
     }
@@ -115,7 +134,8 @@ fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, R
     let check = |window: Window| -> std::result::Result<(bool, Remarkable), (SampleArray, Error)> {
         let samples =
             measurement.read_reflectance(view, window).map_err(|error| (SampleArray::Reflectance, error))?;
-        let stored = measurement.read_luminance(view, window).map_err(|error| (SampleArray::Luminance, error))?;
+        let stored =
+            measurement.read_luminance(view, window).map_err(|error| (SampleArray::Luminance, error))?;
         let mut expected = vec![0; stored.len()];
         let remarkable = codes.fill(&samples, &mut expected);
         Ok((stored == expected, remarkable))
@@ -129,7 +149,9 @@ fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, R
                 remarkable += found;
                 continue;
             }
-            Ok((false, _)) => (SampleArray::Luminance, "L* codes that are not those of the samples".to_owned()),
+            Ok((false, _)) => {
+                (SampleArray::Luminance, "L* codes that are not those of the samples".to_owned())
+            }
             Err((array, error)) => (array, error.to_string()),
         };
         let file = measurement.shard_path(array, view, window).display().to_string();

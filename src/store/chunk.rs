@@ -11,6 +11,14 @@ pub enum Codec {
     Stock,
 }
 
+impl std::fmt::Display for Codec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stock => f.write_str("stock"),
+        }
+    }
+}
+
 /// Encodes chunks of one shape, one after another.
 pub struct Encoder {
     zstd: Option<zstd::bulk::Compressor<'static>>,

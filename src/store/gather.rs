@@ -160,7 +160,8 @@ mod tests {
     fn a_window_over_the_border_holds_its_texels_and_goes_on_with_the_last() {
         let size = Size::new(3, 4);
         for channels in [1, 2, 3] {
-            let sample = |light: usize, y: usize, x: usize, c: usize| (light * 64 + y * 16 + x * 4 + c) as u16;
+            let sample =
+                |light: usize, y: usize, x: usize, c: usize| (light * 64 + y * 16 + x * 4 + c) as u16;
             let image = |light: usize| {
                 (0..3).flat_map(move |y| {
                     (0..4).flat_map(move |x| (0..channels).map(move |c| sample(light, y, x, c)))

@@ -10,6 +10,7 @@ mod lock;
 pub mod mapped;
 pub mod measurement;
 pub mod model;
+pub mod output;
 mod shard;
 
 use std::path::{Path, PathBuf};

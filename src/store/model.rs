@@ -16,9 +16,9 @@ use crate::shape::Size;
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
 use crate::store::{Layout, Lock, Named, Store};
-use btfkit_formats::Direction;
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
+use btfkit_formats::Direction;
 
 /// The attribute `kind` of a model store.
 pub const KIND: &str = "model";

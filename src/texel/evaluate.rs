@@ -3,8 +3,8 @@
 use btfkit_formats::Samples;
 
 use crate::color::Decoder;
-use btfkit_formats::Direction;
 use crate::texel::triangulation::Interpolator;
+use btfkit_formats::Direction;
 
 /// Which measured direction pairs stand for another pair, and with what weights.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use btfkit::random::Hash;
 use btfkit::sample::{Kind, Scene, Surface};
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::model::Model;
-use btfkit_formats::Direction;
 use btfkit::texel::stereo::Stereo;
+use btfkit_formats::Direction;
 
 use crate::fixture::fixture;
 

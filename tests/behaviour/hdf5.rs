@@ -63,11 +63,14 @@ fn pick(samples: &Samples, places: impl Iterator<Item = usize>) -> Samples {
 }
 
 fn write(path: &Path, contents: &Contents, luminance: bool) {
-    let attributes = json!({"white": 0.75, "version": "0.1", "recipe": {"stage": "import", "views": [[0.5, 1]]}});
+    let attributes =
+        json!({"white": 0.75, "version": "0.1", "recipe": {"stage": "import", "views": [[0.5, 1]]}});
     let mut writer = Writer::create(path, contents, attributes.as_object().unwrap()).unwrap();
     let codes = vec![7; (contents.width * contents.height) as usize * contents.lights.len()];
     for view in 0..contents.views.len() {
-        writer.write_view(view, &view_samples(contents, view), luminance.then_some(codes.as_slice())).unwrap();
+        writer
+            .write_view(view, &view_samples(contents, view), luminance.then_some(codes.as_slice()))
+            .unwrap();
     }
     writer.finish().unwrap();
 }
@@ -177,9 +180,13 @@ fn a_file_appears_whole_or_not_at_all() {
 /// A list of images in an order of its own, as h5py would leave it.
 fn image_list(path: &Path, views: usize, lights: usize) -> File {
     let xy = |d: &Direction| d.vector();
-    let pairs: Vec<(usize, usize)> = (0..lights).flat_map(|l| (0..views).rev().map(move |v| (v, l))).collect();
+    let pairs: Vec<(usize, usize)> =
+        (0..lights).flat_map(|l| (0..views).rev().map(move |v| (v, l))).collect();
     let of = |pick: &dyn Fn(&(usize, usize)) -> Direction| {
-        let list: Vec<f32> = pairs.iter().flat_map(|p| xy(&pick(p))[..2].iter().map(|&c| c as f32).collect::<Vec<_>>()).collect();
+        let list: Vec<f32> = pairs
+            .iter()
+            .flat_map(|p| xy(&pick(p))[..2].iter().map(|&c| c as f32).collect::<Vec<_>>())
+            .collect();
         Array2::from_shape_vec((pairs.len(), 2), list).unwrap()
     };
     let file = File::create(path).unwrap();
@@ -214,12 +221,16 @@ fn a_list_of_images_in_any_order_is_read_as_views_and_lights() {
         ((2 - v) * 10_000 + l * 1000 + y * 100 + x * 10 + c) as f32
     };
     let images: Vec<f32> = (1..3)
-        .flat_map(|l| (0..4).flat_map(move |y| (0..6).flat_map(move |x| (0..3).map(move |c| value(1, l, y, x, c)))))
+        .flat_map(|l| {
+            (0..4).flat_map(move |y| (0..6).flat_map(move |x| (0..3).map(move |c| value(1, l, y, x, c))))
+        })
         .collect();
     assert_eq!(archive.read_images(1, 1..3).unwrap(), Samples::F32(images));
     let window = Window { y: 2, x: 1, size: Size::new(2, 3) };
     let texels: Vec<f32> = (2..4)
-        .flat_map(|y| (1..4).flat_map(move |x| (0..4).flat_map(move |l| (0..3).map(move |c| value(0, l, y, x, c)))))
+        .flat_map(|y| {
+            (1..4).flat_map(move |x| (0..4).flat_map(move |l| (0..3).map(move |c| value(0, l, y, x, c))))
+        })
         .collect();
     assert_eq!(archive.read_view(0, window).unwrap(), Samples::F32(texels));
 }
@@ -366,7 +377,10 @@ fn other_types_and_other_filters_are_refused_by_name() {
     let file = small(&path);
     file.unlink("reflectance").unwrap();
     let made = dataset(&file, "reflectance", &ArrayD::<i32>::zeros(vec![2, 4, 4, 3, 1]));
-    made.new_attr_builder().with_data(&[FixedAscii::<1>::from_ascii("Y").unwrap()]).create("channels").unwrap();
+    made.new_attr_builder()
+        .with_data(&[FixedAscii::<1>::from_ascii("Y").unwrap()])
+        .create("channels")
+        .unwrap();
     drop((made, file));
     let told = refused(&path);
     assert!(told.contains("samples of type int32"), "{told}");
@@ -457,7 +471,8 @@ fn no_flipped_bit_brings_the_reader_down() {
             .unwrap();
         drop(started);
         let log = path.with_extension("log");
-        let reached = || std::fs::read_to_string(&log).unwrap_or_default().get(..12).map(|at| at.trim().to_owned());
+        let reached =
+            || std::fs::read_to_string(&log).unwrap_or_default().get(..12).map(|at| at.trim().to_owned());
         let (mut at, mut since) = (None, Instant::now());
         let status = loop {
             if let Some(status) = child.try_wait().unwrap() {

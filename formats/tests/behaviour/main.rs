@@ -6,18 +6,21 @@
     clippy::print_stdout // the test on real files says whether it found any
 )]
 
+mod big;
 mod bonn_color;
 mod bonn_damage;
 mod bonn_reading;
 mod bonn_support;
 mod bonn_writing;
-mod big;
 mod catalogue;
 mod damage;
 mod jpeg;
 mod lists;
 mod measured_files;
 mod measured_lists;
+mod mif;
+mod mlvq;
+mod mlvq_files;
 mod npy;
 mod picture;
 mod picture_damage;
@@ -26,9 +29,6 @@ mod picture_files;
 mod picture_hdr;
 mod picture_png;
 mod picture_tiff;
-mod mif;
-mod mlvq;
-mod mlvq_files;
 mod support;
 mod utia_files;
 mod zip_reading;

@@ -46,6 +46,23 @@ impl Description {
         self.texel_samples() * self.sample_type.bytes()
     }
 
+    /// Side of a chunk in texels.
+    pub fn chunk_side(&self) -> usize {
+        CHUNK_SIDE
+    }
+
+    /// Shape of a chunk of samples.
+    pub(super) fn chunk_shape(&self) -> Vec<u64> {
+        let mut shape = self.code_chunk_shape();
+        shape.push(self.n_channels() as u64);
+        shape
+    }
+
+    /// Shape of a chunk of L* codes.
+    pub(super) fn code_chunk_shape(&self) -> Vec<u64> {
+        vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, self.lights.len() as u64]
+    }
+
     /// Bytes of one view's samples.
     pub fn view_bytes(&self) -> u64 {
         self.size.texels() as u64 * self.texel_bytes() as u64

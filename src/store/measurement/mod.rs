@@ -21,9 +21,10 @@ use crate::run::recipe;
 use crate::shape::{Size, Window};
 use crate::store::chunk::Codec;
 use crate::store::{Array, Layout, Named, Store};
-use btfkit_formats::Direction;
 use crate::views::Views;
+use btfkit_formats::Direction;
 pub use description::Description;
+pub(crate) use write::encoded_bytes;
 use description::SHARD_LIMIT_BYTES;
 
 /// The attribute `kind` of a measurement store.
@@ -150,6 +151,12 @@ impl Measurement {
         &self.digest
     }
 
+    /// What its import had to assume because the archive does not say it.
+    pub fn assumptions(&self) -> Vec<String> {
+        let found = self.store.attributes().ok().flatten().unwrap_or_default();
+        found.get("assumptions").and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default()
+    }
+
     /// Where it lies.
     pub fn path(&self) -> &Path {
         self.store.path()
@@ -166,16 +173,6 @@ impl Measurement {
     /// Number of views written so far.
     pub fn views_done(&self) -> usize {
         (0..self.description.views.len()).filter(|&view| self.has_view(view)).count()
-    }
-
-    fn chunk_shape(&self) -> Vec<u64> {
-        let mut shape = self.code_chunk_shape();
-        shape.push(self.description.n_channels() as u64);
-        shape
-    }
-
-    fn code_chunk_shape(&self) -> Vec<u64> {
-        vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, self.description.lights.len() as u64]
     }
 
     /// The texels of each chunk, cut at the border of the plane.
@@ -399,8 +396,7 @@ mod tests {
             .unwrap();
             assert_eq!(measurement.side, side);
             let images = noise(sample_type, size.texels() * 15);
-            let codes =
-                LightnessCodes::new(Transfer::Srgb, sample_type, &description.channels, 1.0).unwrap();
+            let codes = LightnessCodes::new(Transfer::Srgb, sample_type, &description.channels, 1.0).unwrap();
             let groups = vec![(0..5, images.clone())];
             let view = Images::new(size, 3, sample_type, groups).unwrap();
             measurement.write_view(1, &view, &codes).unwrap();
@@ -412,8 +408,7 @@ mod tests {
             codes.fill(&texels, &mut expected);
             assert_eq!(measurement.read_luminance(1, size.window()).unwrap(), expected);
             let window = Window { y: 14, x: 13, size: Size::new(5, 19) };
-            let rows =
-                (14..19).flat_map(|y| &expected[(y * size.width + 13) * 5..(y * size.width + 32) * 5]);
+            let rows = (14..19).flat_map(|y| &expected[(y * size.width + 13) * 5..(y * size.width + 32) * 5]);
             assert_eq!(measurement.read_luminance(1, window).unwrap(), rows.copied().collect::<Vec<u8>>());
         }
     }

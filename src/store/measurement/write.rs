@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{CHUNK_SIDE, Measurement};
+use super::{CHUNK_SIDE, Description, Measurement};
 use crate::color::{LightnessCodes, Remarkable};
 use crate::error::Result;
 use crate::shape::{Size, Window};
-use crate::store::chunk::Encoder;
+use crate::store::chunk::{Codec, Encoder};
 use crate::store::gather::{self, Images};
 use crate::store::shard;
 
@@ -22,8 +22,7 @@ impl Measurement {
             let places: Vec<Option<Window>> = (0..across * across)
                 .map(|place| self.chunk_window([sy, sx], [place / across, place % across]))
                 .collect();
-            let encoder =
-                || (Encoder::new(self.codec, self.chunk_shape()), Encoder::new(self.codec, self.code_chunk_shape()));
+            let encoder = || Encoders::new(&self.description, self.codec);
             let chunks: Vec<Option<Encoded>> = places
                 .par_iter()
                 .map_init(encoder, |encoders, window| {
@@ -32,7 +31,8 @@ impl Measurement {
                 .collect::<Result<_>>()?;
             let (mut reflectance, mut luminance) = (Vec::new(), Vec::new());
             for chunk in chunks {
-                let (samples, codes, remarkable) = chunk.map_or((None, None, None), |(s, c, r)| (Some(s), Some(c), Some(r)));
+                let (samples, codes, remarkable) =
+                    chunk.map_or((None, None, None), |(s, c, r)| (Some(s), Some(c), Some(r)));
                 reflectance.push(samples);
                 luminance.push(codes);
                 found += remarkable.unwrap_or_default();
@@ -55,7 +55,7 @@ impl Measurement {
 
     fn encode(
         &self,
-        (encoder, code_encoder): &mut (Encoder, Encoder),
+        encoders: &mut Encoders,
         images: &Images,
         codes: &LightnessCodes,
         window: Window,
@@ -64,7 +64,7 @@ impl Measurement {
         let mut luminance = vec![0; window.size.texels() * self.description.lights.len()];
         let all = codes.fill(&samples, &mut luminance);
         let remarkable = self.inside(window, all, &samples, codes);
-        Ok((encoder.encode(gather::bytes(&samples))?, code_encoder.encode(&luminance)?, remarkable))
+        Ok((encoders.samples.encode(gather::bytes(&samples))?, encoders.codes.encode(&luminance)?, remarkable))
     }
 
     /// What was found in the part of a chunk that lies within the plane.
@@ -76,7 +76,8 @@ impl Measurement {
         codes: &LightnessCodes,
     ) -> Remarkable {
         let Size { height, width } = self.description.size;
-        let within = Size::new(window.size.height.min(height - window.y), window.size.width.min(width - window.x));
+        let within =
+            Size::new(window.size.height.min(height - window.y), window.size.width.min(width - window.x));
         if within == window.size || all == Remarkable::default() {
             return all;
         }
@@ -91,4 +92,34 @@ impl Measurement {
         }
         found
     }
+}
+
+/// What one thread encodes with.
+struct Encoders {
+    samples: Encoder,
+    codes: Encoder,
+}
+
+impl Encoders {
+    fn new(description: &Description, codec: Codec) -> Self {
+        Self {
+            samples: Encoder::new(codec, description.chunk_shape()),
+            codes: Encoder::new(codec, description.code_chunk_shape()),
+        }
+    }
+}
+
+/// Bytes that a chunk of both arrays takes, encoded.
+pub(crate) fn encoded_bytes(
+    description: &Description,
+    codec: Codec,
+    codes: &LightnessCodes,
+    images: &Images,
+    window: Window,
+) -> Result<usize> {
+    let mut encoders = Encoders::new(description, codec);
+    let samples = images.gather(window);
+    let mut luminance = vec![0; window.size.texels() * description.lights.len()];
+    codes.fill(&samples, &mut luminance);
+    Ok(encoders.samples.encode(gather::bytes(&samples))?.len() + encoders.codes.encode(&luminance)?.len())
 }

@@ -1,0 +1,87 @@
+use std::path::{Path, PathBuf};
+
+use btfkit::error::{Error, Kind, Result};
+use btfkit::run::Context;
+use btfkit::stage::export::{self, Format};
+use btfkit::store::measurement::Measurement;
+use clap::{Args, ValueEnum};
+
+use super::{Tell, bytes_text};
+
+/// Measurement to archive: UBO2003 zip, EXR or PNG folder, HDF5, npy, Bonn DFMF or FMF
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf export wood.zarr wood.npy                       for numpy: [view, light, y, x, channel], and two arrays of directions
+  btf export wood.zarr wood.h5                        for h5py and MATLAB
+  btf export wood.zarr wood-exr --to exr              a folder of linear pictures
+  btf export wood.zarr wood.zip --quality 95          JPEGs named as in UBO2003 (lossy)
+  btf export wood.zarr wood.btf --rank 100            for viewers of Bonn's containers; without --rank it is exact, and as large as the raw data
+Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.")]
+pub(super) struct Export {
+    /// A measurement
+    store: PathBuf,
+    /// The file or folder to make
+    output: PathBuf,
+    /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF]
+    #[arg(long, value_enum)]
+    to: Option<FormatName>,
+    /// Components of a factorised container [default: all]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
+    rank: Option<u32>,
+    /// JPEG quality
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u8).range(1..=100))]
+    quality: u8,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FormatName {
+    Ubo2003,
+    Exr,
+    Png,
+    Npy,
+    Hdf5,
+    Dfmf,
+    Fmf,
+}
+
+impl Export {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let format = match self.to {
+            Some(FormatName::Ubo2003) => Format::Ubo2003,
+            Some(FormatName::Exr) => Format::Exr,
+            Some(FormatName::Png) => Format::Png,
+            Some(FormatName::Npy) => Format::Npy,
+            Some(FormatName::Hdf5) => Format::Hdf5,
+            Some(FormatName::Dfmf) => Format::Dfmf,
+            Some(FormatName::Fmf) => Format::Fmf,
+            None => of_name(&self.output).ok_or_else(|| {
+                Error::new(Kind::Usage, format!("{}: no format goes by this name", self.output.display()))
+                    .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
+            })?,
+        };
+        let measurement = Measurement::open(&self.store)?;
+        let options = export::Options {
+            output: self.output.clone(),
+            format,
+            rank: self.rank.map(|rank| rank as usize),
+            quality: self.quality,
+        };
+        let report = export::run(&measurement, &options, context)?;
+        tell.line(format!("{}: {}", self.output.display(), bytes_text(report.bytes)));
+        for warning in &report.warnings {
+            tell.line(format!("note: {warning}"));
+        }
+        Ok(())
+    }
+}
+
+fn of_name(path: &Path) -> Option<Format> {
+    Some(match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+        "zip" => Format::Ubo2003,
+        "npy" => Format::Npy,
+        "h5" | "hdf5" => Format::Hdf5,
+        "btf" => Format::Dfmf,
+        _ => return None,
+    })
+}

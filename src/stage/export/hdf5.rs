@@ -1,0 +1,49 @@
+//! One HDF5 file with the arrays and attributes of the store.
+
+use btfkit_formats::Contents;
+use serde_json::{Map, Value, json};
+
+use super::Options;
+use crate::color::Transfer;
+use crate::error::Result;
+use crate::hdf5::Writer;
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::store::measurement::Measurement;
+
+pub(super) fn write(
+    measurement: &Measurement,
+    options: &Options,
+    context: &Context<'_>,
+) -> Result<Vec<String>> {
+    let description = measurement.description();
+    let contents = Contents {
+        format: "measurement store".to_owned(),
+        width: description.size.width as u32,
+        height: description.size.height as u32,
+        channels: description.channels.clone(),
+        sample_type: description.sample_type,
+        views: description.views.clone(),
+        lights: description.lights.clone(),
+        linear: description.transfer == Transfer::Linear,
+        cosine_included: true,
+        assumptions: Vec::new(),
+        remarks: Vec::new(),
+    };
+    let attributes = Map::from_iter([
+        ("white".to_owned(), json!(description.white)),
+        ("version".to_owned(), Value::from(env!("CARGO_PKG_VERSION"))),
+        ("digest".to_owned(), Value::from(measurement.digest())),
+    ]);
+    let mut writer = Writer::create(&options.output, &contents, &attributes)?;
+    let whole = description.size.window();
+    context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
+    for view in 0..description.views.len() {
+        context.check_stop()?;
+        let samples = measurement.read_reflectance(view, whole)?;
+        writer.write_view(view, &samples, Some(&measurement.read_luminance(view, whole)?))?;
+        context.progress.advance(1);
+    }
+    writer.finish()?;
+    Ok(Vec::new())
+}

@@ -1,0 +1,134 @@
+//! Measurement to archive: so that others' programs open what we hold, and nobody is locked in.
+
+mod bonn;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+mod npy;
+mod pictures;
+
+use std::path::{Path, PathBuf};
+
+use btfkit_formats::{SampleType, Samples, f16};
+use serde::Serialize;
+
+use crate::color::Transfer;
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::store::gather::images_of_texels;
+use crate::store::measurement::Measurement;
+
+/// What to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// A zip of JPEGs named as in UBO2003: 8 bits, sRGB, lossy.
+    Ubo2003,
+    /// A folder of OpenEXR pictures: linear, halves or floats.
+    Exr,
+    /// A folder of PNGs: the 8- or 16-bit samples as they are.
+    Png,
+    /// An array [view, light, y, x, channel] for numpy, and two with its directions.
+    Npy,
+    /// One HDF5 file with the arrays of the store.
+    Hdf5,
+    /// Bonn's DFMF container: one factorisation a channel; 3 channels for most viewers.
+    Dfmf,
+    /// Bonn's FMF container: one factorisation of all channels.
+    Fmf,
+}
+
+/// What to export, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The file or folder to make.
+    pub output: PathBuf,
+    /// Its format.
+    pub format: Format,
+    /// Components of a factorisation; all where none is given, which is exact.
+    pub rank: Option<usize>,
+    /// JPEG quality, 1 to 100.
+    pub quality: u8,
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// What other programs will not like, a sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Writes a whole measurement as an archive.
+///
+/// # Errors
+/// A measurement that is not complete, or that the format cannot hold; an output that exists.
+pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
+    let views = measurement.description().views.len();
+    let done = measurement.views_done();
+    if done < views {
+        let found = format!("{}: {done} of {views} views are there", measurement.path().display());
+        return Err(Error::missing(found).hint("finish its import first"));
+    }
+    if options.output.exists() {
+        return Err(Error::input(format!("{} exists", options.output.display()))
+            .hint("choose another name, or delete it"));
+    }
+    let warnings = match options.format {
+        Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
+        Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,
+        Format::Png => pictures::folder(measurement, options, pictures::Kind::Png, context)?,
+        Format::Npy => npy::write(measurement, options, context)?,
+        Format::Hdf5 => hdf5(measurement, options, context)?,
+        Format::Dfmf => bonn::dfmf(measurement, options, context)?,
+        Format::Fmf => bonn::fmf(measurement, options, context)?,
+    };
+    context.progress.end();
+    Ok(Report { bytes: bytes_of(&options.output), warnings })
+}
+
+#[cfg(feature = "hdf5")]
+use self::hdf5::write as hdf5;
+
+#[cfg(not(feature = "hdf5"))]
+fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Vec<String>> {
+    Err(crate::hdf5::not_built_in(&options.output))
+}
+
+fn bytes_of(path: &Path) -> u64 {
+    if path.is_dir() {
+        let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+        entries.map(|entry| bytes_of(&entry.path())).sum()
+    } else {
+        std::fs::metadata(path).map_or(0, |data| data.len())
+    }
+}
+
+/// Calls `each` with every view and its images, [light, y, x, channel].
+fn for_each_view(
+    measurement: &Measurement,
+    context: &Context<'_>,
+    mut each: impl FnMut(usize, Samples) -> Result<()>,
+) -> Result<()> {
+    let description = measurement.description();
+    context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
+    for view in 0..description.views.len() {
+        context.check_stop()?;
+        let texels = measurement.read_reflectance(view, description.size.window())?;
+        each(view, images_of_texels(&texels, description.lights.len(), description.n_channels()))?;
+        context.progress.advance(1);
+    }
+    Ok(())
+}
+
+/// Linear samples: halves for 8 bits, which are told apart by them, and for halves; floats for the others.
+fn linear(samples: &Samples, transfer: Transfer) -> Samples {
+    if transfer == Transfer::Linear && matches!(samples, Samples::F16(_) | Samples::F32(_)) {
+        return samples.clone();
+    }
+    let values = (0..samples.len()).map(|at| transfer.decode(samples.value(at).unwrap_or(0.0)));
+    match samples.sample_type() {
+        SampleType::U8 | SampleType::F16 => Samples::F16(values.map(f16::from_f64).collect()),
+        SampleType::U16 | SampleType::F32 => Samples::F32(values.map(|value| value as f32).collect()),
+    }
+}

@@ -1,6 +1,8 @@
 //! Behaviour of the program and the library, on samples that they make themselves.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, unreachable_pub)]
 
+#[path = "behaviour/archives.rs"]
+mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
 #[path = "behaviour/determinism.rs"]
@@ -20,3 +22,5 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/verify.rs"]
+mod verify;

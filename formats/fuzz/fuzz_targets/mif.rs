@@ -16,7 +16,7 @@ fn read(bytes: &[u8]) {
 fuzz_target!(|bytes: &[u8]| {
     read(bytes);
     // The same bytes as the XML of a file of two images.
-    let chunk = |kind: u64, data: &[u8]| [&kind.to_le_bytes(), &(data.len() as u64).to_le_bytes(), data].concat();
+    let chunk = |kind: u64, data: &[u8]| [&kind.to_le_bytes()[..], &(data.len() as u64).to_le_bytes(), data].concat();
     let image = |index: u64| [index, 0, 1, 1, 1, 1].map(u64::to_le_bytes).concat();
     let image = |index: u64| chunk(0, &[image(index), vec![7]].concat());
     let mut file = b"MIF FILE".to_vec();

@@ -10,7 +10,7 @@ use crate::reader::Reader;
 use crate::ubo2003::Angles;
 use crate::{Error, Result};
 
-/// Linear YCbCr (ITU-R BT.601, 8-bit) to RGB, as the encoder's authors write it.
+/// 8-bit YCbCr of studio range (ITU-R BT.601) to RGB, with the roundings of the encoder's authors.
 const RGB_OF_Y: f64 = 298.082 / 256.0;
 const RED: (f64, f64, f64) = (0.0, 408.583 / 256.0, -222.921);
 const GREEN: (f64, f64, f64) = (-100.291 / 256.0, -208.120 / 256.0, 135.576);

@@ -156,8 +156,7 @@ mod tests {
         let many: Vec<Pair> =
             (0..60_000).map(|i| pair((45.0, f64::from(i) / 1e3), (45.0, f64::from(i) / 1e3))).collect();
         assert!(Grid::from_pairs(&many, &Limits::default()).is_err());
-        let mut limits = Limits::default();
-        limits.max_directions = 1;
+        let limits = Limits { max_directions: 1, ..Limits::default() };
         assert_eq!(
             Grid::from_pairs(&[pair(a, a), pair(b, a)], &limits).unwrap_err().kind(),
             ErrorKind::Limit

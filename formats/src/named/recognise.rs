@@ -249,6 +249,7 @@ mod tests {
             ("15_30_45_60.png", ""),
             ("l1_v2.png", ""),
             ("tl15.png", ""),
+            ("atl15_apl30.png", ""),
             ("tv15_pv30.png", ""),
             ("tl15_pl30_theta_i20.png", ""),
             ("tl95_pl30.png", ""),

@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn columns_in_any_order_case_and_separation() {
         let text = "# measured on a Monday\n\nPhi_V;FILE;theta_i;exposure;phi_i;theta_v\n\
-            -90; a b.png ;15.5;1/60;360;30\r\n# dark\n1;\"c;d.png\";0;;5;75\n";
+            -90; a b.png ;15.5;1/60;360;30\r\n# dark\r\n\r\n1;\"c;d.png\";0;;5;75\n";
         for text in
             [text.to_owned(), format!("\u{feff}{text}"), text.replace("c;d", "c.d").replace(';', "\t")]
         {
@@ -209,7 +209,7 @@ mod tests {
             assert_eq!(table.rows[0].file, "a b.png");
             assert_eq!(table.rows[0].pair, pair([15.5, 0.0, 30.0, 270.0]));
             assert_eq!(table.rows[1].pair, pair([0.0, 0.0, 75.0, 1.0]));
-            assert_eq!((table.rows[0].line, table.rows[1].line), (4, 6));
+            assert_eq!((table.rows[0].line, table.rows[1].line), (4, 7));
         }
         assert_eq!(table(text).unwrap().rows[1].file, "c;d.png");
     }

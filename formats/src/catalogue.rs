@@ -79,8 +79,8 @@ pub struct CatalogueErrors {
 }
 
 impl Catalogue {
-    /// Sorts out the files of a set: the name of each, from one container or from several one after the other, and the directions
-    /// that it was taken under; `None` is no image, counted and otherwise ignored.
+    /// Sorts out the files of a set: the name of each, from one container or from several one after the
+    /// other, and the directions that it was taken under; `None` is no image, counted and otherwise ignored.
     ///
     /// ```
     /// use btfkit_formats::{Angles, Catalogue, Pair};
@@ -215,8 +215,8 @@ fn number(given: &[Angles]) -> (Vec<Angles>, Vec<usize>) {
     (distinct, numbers)
 }
 
-/// The first direction that was there before, or one so near that it counts as the same: both positions, earlier
-/// and later.
+/// The first direction that was there before, or one so near that it counts as the same: both positions,
+/// earlier and later.
 pub(crate) fn repeated_direction(given: &[Angles]) -> Option<(usize, usize)> {
     let mut first: Vec<Option<usize>> = vec![None; given.len()];
     number(given).1.into_iter().enumerate().find_map(|(at, number)| {

@@ -2,7 +2,8 @@
 
 use crate::{Angles, Pair};
 
-/// One number of one direction: `theta_i`, `phi_i`, `x_i`, `y_i`, `z_i` of the light, `theta_v` ... of the view.
+/// One number of one direction: `theta_i`, `phi_i`, `x_i`, `y_i`, `z_i` of the light, `theta_v` ... of the
+/// view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Field {
     side: Side,
@@ -150,8 +151,8 @@ fn form_of(side: Side, fields: &[Field]) -> Result<Option<Form>, String> {
     }
 }
 
-/// Bytes of the decimal number that a text starts with: an optional minus sign and digits, and the same with the
-/// fraction, if there is one.
+/// Bytes of the decimal number that a text starts with: an optional minus sign and digits, and the same with
+/// the fraction, if there is one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NumberPrefix {
     pub(crate) whole: usize,

@@ -12,17 +12,17 @@ pub(crate) fn base(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// The path without its extension, if that is a picture's. The `._` companions that one system leaves beside its files, with
-/// the extension of the file, are no pictures.
+/// The path without its extension, if that is a picture's. The `._` companions that one system leaves beside
+/// its files, with the extension of the file, are no pictures.
 pub(crate) fn picture_stem(path: &str) -> Option<&str> {
     let (stem, extension) = path.rsplit_once('.')?;
     let known = PICTURE_EXTENSIONS.iter().any(|known| known.eq_ignore_ascii_case(extension));
     (known && !base(path).starts_with("._")).then_some(stem)
 }
 
-/// A file that a list names, as a path inside the list's own folder with `/` between its parts. A safe relative
-/// path stays; of any other (absolute, with a drive, climbing by `..`: written on another machine) only the last
-/// part does. `None` if nothing usable is left. So a list never reaches out of its folder.
+/// A file that a list names, as a path inside the list's own folder with `/` between its parts. A safe
+/// relative path stays; of any other (absolute, with a drive, climbing by `..`: written on another machine)
+/// only the last part does. `None` if nothing usable is left. So a list never reaches out of its folder.
 pub(crate) fn inside_folder(path: &str) -> Option<String> {
     let kept = if unsafe_reason(path).is_none() { path } else { base(path) };
     let parts: Vec<&str> = kept.split(['/', '\\']).filter(|part| !part.is_empty() && *part != ".").collect();

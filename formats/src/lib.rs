@@ -11,14 +11,15 @@
 //! | entry | one file in a zip; entries are numbered from 0 in the order of the central directory |
 //! | image | one photograph of the material: one light direction and one view direction |
 //! | view, light | indices of directions, sorted by theta, then phi |
-//! | theta, phi | polar angle from the surface normal and azimuth, **degrees** here, as in file names |
+//! | theta, phi | polar angle from the surface normal and azimuth: **degrees** in [`Angles`], as in file names, radians in [`Direction`] |
 //!
 //! # Where to start
 //!
 //! An UBO2003 zip is read in four steps: [`zip::ZipIndex::open`] lists the entries,
 //! [`ubo2003::Catalogue::from_names`] finds the image of every view and light,
 //! [`zip::ZipIndex::read`] gives the bytes of one entry and [`jpeg::decode`] its samples. A folder of
-//! images needs the second and the last only.
+//! images needs the second and the last only. Where names are others, [`named`] finds the angles in them, and a
+//! [`table`] or a light list ([`rti`]) says them; all lead to a [`Catalogue`].
 //!
 //! ```
 //! use btfkit_formats::{Limits, jpeg, ubo2003, zip};

@@ -1,10 +1,11 @@
 //! A table beside the pictures: one row for each, its file and its directions.
 //!
-//! CSV with a header line. Columns, in any order and case: `file`; `theta_i`, `phi_i` of the light; `theta_v`,
-//! `phi_v` of the view, all in degrees. A direction may be a vector `x_i`, `y_i`, `z_i` (`x_v` ...) of any length
-//! instead. Without columns of the view all pictures have the frontal one. Other columns are ignored, so are
-//! lines that start with `#` and empty ones. Columns are separated by comma, semicolon or tab; numbers have a decimal point.
-//! Frame as everywhere: x right, y up, z out of the surface, phi counter-clockwise from +x.
+//! CSV with a header line. Columns, in any order and case: `file`; `theta_i`, `phi_i` of the light;
+//! `theta_v`, `phi_v` of the view, all in degrees. A direction may be a vector `x_i`, `y_i`, `z_i` (`x_v`
+//! ...) of any length instead. Without columns of the view all pictures have the frontal one. Other columns
+//! are ignored, so are lines that start with `#` and empty ones. Columns are separated by comma, semicolon or
+//! tab; numbers have a decimal point. Frame as everywhere: x right, y up, z out of the surface, phi
+//! counter-clockwise from +x.
 //!
 //! `file` is a path inside the table's folder. Of a path that is absolute, has a drive or climbs by `..`
 //! (a table from another machine) the last part counts; so a table never reaches out of its folder.
@@ -44,7 +45,8 @@ struct Columns {
     forms: Forms,
 }
 
-/// Reads a table. Pairs that are missing or double are found by [`Catalogue::from_pairs`](crate::Catalogue::from_pairs).
+/// Reads a table. Pairs that are missing or double are found by
+/// [`Catalogue::from_pairs`](crate::Catalogue::from_pairs).
 ///
 /// # Errors
 /// [`ErrorKind::Malformed`], with line and column: no header with the columns that are needed, a row with
@@ -158,8 +160,8 @@ fn translate(error: &csv::Error, bytes: &[u8]) -> Error {
     }
 }
 
-/// Line and byte where a record starts. The parser's own position is where the record before it ends, in front of comments
-/// and, often, of a line feed.
+/// Line and byte where a record starts. The parser's own position is where the record before it ends, in
+/// front of comments and, often, of a line feed.
 fn start(position: Option<&csv::Position>, bytes: &[u8]) -> (u64, u64) {
     let (mut line, mut byte) = position.map_or((1, 0), |position| (position.line(), position.byte()));
     let mut rest = usize::try_from(byte).ok().and_then(|byte| bytes.get(byte..)).unwrap_or(&[]);
@@ -198,7 +200,7 @@ mod tests {
     #[test]
     fn columns_in_any_order_case_and_separation() {
         let text = "# measured on a Monday\n\nPhi_V;FILE;theta_i;exposure;phi_i;theta_v\n\
-            -90; a b.png ;15.5;1/60;360;30\r\n# dark\n1;\"c;d.png\";0;;5;75\n";
+            -90; a b.png ;15.5;1/60;360;30\r\n# dark\r\n\r\n1;\"c;d.png\";0;;5;75\n";
         for text in
             [text.to_owned(), format!("\u{feff}{text}"), text.replace("c;d", "c.d").replace(';', "\t")]
         {
@@ -207,7 +209,7 @@ mod tests {
             assert_eq!(table.rows[0].file, "a b.png");
             assert_eq!(table.rows[0].pair, pair([15.5, 0.0, 30.0, 270.0]));
             assert_eq!(table.rows[1].pair, pair([0.0, 0.0, 75.0, 1.0]));
-            assert_eq!((table.rows[0].line, table.rows[1].line), (4, 6));
+            assert_eq!((table.rows[0].line, table.rows[1].line), (4, 7));
         }
         assert_eq!(table(text).unwrap().rows[1].file, "c;d.png");
     }

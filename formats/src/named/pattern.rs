@@ -15,7 +15,7 @@ const MAX_BYTES: usize = 1024;
 ///
 /// | in the pattern | in a name |
 /// | --- | --- |
-/// | `{theta_i}` `{phi_i}` | angles of the light, a decimal number in degrees; theta 0..=90, phi any, negative too |
+/// | `{theta_i}` `{phi_i}` | angles of the light, a decimal number in degrees; theta 0..=90, phi any |
 /// | `{theta_v}` `{phi_v}` | angles of the view |
 /// | `{theta_i:rad}` ... | the same in radians (`:deg` is the default) |
 /// | `{x_i}` `{y_i}` `{z_i}`, `{x_v}` ... | a vector towards the light or the viewer, of any length |
@@ -24,8 +24,9 @@ const MAX_BYTES: usize = 1024;
 /// | other text | itself, without regard to ASCII case |
 ///
 /// A pattern with `/` is compared with as many parts from the end of a path as it has; one without, with the
-/// file's name. One that ends in no picture's extension fits all of them. Numbers take all digits that follow,
-/// so there must be text between two fields, but for a `{*}` after a number. The light must be there; without the view all names have the frontal one.
+/// file's name. One that ends in no picture's extension fits all of them. Numbers take all digits that
+/// follow, so there must be text between two fields, but for a `{*}` after a number. The light must be there;
+/// without the view all names have the frontal one.
 ///
 /// ```
 /// use btfkit_formats::{Angles, named::Pattern};

@@ -42,12 +42,12 @@ enum Labels {
 
 /// Finds the pattern of a folder's pictures; names that are no pictures do not count.
 ///
-/// Two ways of labelling are known, in any order of the labels and without regard to case. A label for each number: `tl` or
-/// `theta_l`, `pl` or `phi_l`, or `x_l`, `y_l`, `z_l`, with or without the underscore, where the side `l`, `i` or
-/// `light` is the light and `v`, `o` or `view` the view: `tv15_pv30_tl45_pl60`,
-/// `thetaI=15 phiI=30`, `ti_15_pi_30_to_0_po_0`. Or a label for theta and phi
-/// together: `l15_30_v45_60`. Angles are in degrees. The label may be in the file's name or, for one side,
-/// in that of its folder. Numbers without a label become `{n}`, the rest of the first name stays as it is.
+/// Two ways of labelling are known, in any order of the labels and without regard to case. A label for each
+/// number: `tl` or `theta_l`, `pl` or `phi_l`, or `x_l`, `y_l`, `z_l`, with or without the underscore, where
+/// the side `l`, `i` or `light` is the light and `v`, `o` or `view` the view: `tv15_pv30_tl45_pl60`,
+/// `thetaI=15 phiI=30`, `ti_15_pi_30_to_0_po_0`. Or a label for theta and phi together: `l15_30_v45_60`.
+/// Angles are in degrees. The label may be in the file's name or, for one side, in that of its folder.
+/// Numbers without a label become `{n}`, the rest of the first name stays as it is.
 ///
 /// ```
 /// use btfkit_formats::named::recognise;
@@ -183,7 +183,7 @@ fn direction_label(before: &str) -> Option<Side> {
     SIDES.iter().find_map(|&(word, side)| ends_with_word(before, word).then_some(side))
 }
 
-/// Whether a text ends with this word, in lower case, and nothing but separators behind it and no letter before it.
+/// Whether a text, less the separators at its end, ends with this word in any case, with no letter before it.
 fn ends_with_word(text: &str, word: &str) -> bool {
     let text = text.trim_end_matches(SEPARATORS);
     let start = text.len().checked_sub(word.len());
@@ -249,6 +249,7 @@ mod tests {
             ("15_30_45_60.png", ""),
             ("l1_v2.png", ""),
             ("tl15.png", ""),
+            ("atl15_apl30.png", ""),
             ("tv15_pv30.png", ""),
             ("tl15_pl30_theta_i20.png", ""),
             ("tl95_pl30.png", ""),

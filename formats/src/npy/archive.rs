@@ -9,8 +9,8 @@ use crate::catalogue::repeated_direction;
 use crate::directions::published_name;
 use crate::{Angles, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
-/// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0 at the
-/// top. float64 is read as float32.
+/// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0
+/// at the top. float64 is read as float32.
 #[derive(Debug, Clone)]
 pub struct Archive {
     header: Header,
@@ -126,8 +126,8 @@ impl Images for Archive {
     }
 }
 
-/// The start of a file of an array `[view, light, y, x, channel]`; the samples follow, as [`sample_bytes`] gives
-/// them. Version 1.0, little-endian, C order, aligned to 64 bytes.
+/// The start of a file of an array `[view, light, y, x, channel]`; the samples follow, as [`sample_bytes`]
+/// gives them. Version 1.0, little-endian, C order, aligned to 64 bytes.
 pub fn header(shape: [u64; 5], sample_type: SampleType) -> Vec<u8> {
     let scalar = match sample_type {
         SampleType::U8 => Scalar::U8,

@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 use super::header::{Header, Scalar, elements, write};
 use crate::{Angles, Direction, Error, ErrorKind, Limits, Result};
 
-/// Reads a list of directions: `[n, 2]` theta and phi in radians, or `[n, 3]` vectors of any length, x right, y up, z
-/// out of the surface; float32 or float64. By custom the lists of `NAME.npy` are `NAME.views.npy` and
+/// Reads a list of directions: `[n, 2]` theta and phi in radians, or `[n, 3]` vectors of any length, x right,
+/// y up, z out of the surface; float32 or float64. By custom the lists of `NAME.npy` are `NAME.views.npy` and
 /// `NAME.lights.npy`.
 ///
 /// # Errors
@@ -60,7 +60,8 @@ fn direction(numbers: &[f64]) -> std::result::Result<Direction, &'static str> {
     }
 }
 
-/// A list of directions as a file that [`directions`] and numpy read: float64 `[n, 2]`, theta and phi in radians.
+/// A list of directions as a file that [`directions`] and numpy read: float64 `[n, 2]`, theta and phi in
+/// radians.
 pub fn directions_file(directions: &[Direction]) -> Vec<u8> {
     let count = u64::try_from(directions.len()).unwrap_or(u64::MAX);
     let mut file = write(&[count, 2], Scalar::F64);

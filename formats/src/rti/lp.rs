@@ -28,11 +28,11 @@ pub struct Lamp {
 
 /// Reads a light position list.
 ///
-/// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y z,
-/// the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by spaces or tabs, lines end in LF, CRLF or CR.
-/// A count that is wrong or not there is a warning. A second variant has no names. Of a name that is absolute,
-/// has a drive or climbs by `..` (a list from another machine) the last part counts, so a list never reaches
-/// out of its folder.
+/// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y
+/// z, the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by
+/// spaces or tabs, lines end in LF, CRLF or CR. A count that is wrong or not there is a warning. A second
+/// variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another
+/// machine) the last part counts, so a list never reaches out of its folder.
 ///
 /// # Errors
 /// [`ErrorKind::Malformed`], with the line: no light at all, a line that is none, a vector of no length or into the

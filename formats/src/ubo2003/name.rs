@@ -18,9 +18,10 @@ pub struct ImageName {
 
 /// Reads the name of an image, or `None` if it is not one.
 ///
-/// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif, tiff,
-/// hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or without decimals; theta in 0..=90, phi any (it may
-/// be negative). Case, order, separators, and whatever else the name holds, do not matter.
+/// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif,
+/// tiff, hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or
+/// without decimals; theta in 0..=90, phi any (it may be negative). Case, order, separators, and whatever
+/// else the name holds, do not matter.
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{Angles, parse_name};

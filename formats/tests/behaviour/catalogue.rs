@@ -165,6 +165,9 @@ fn directions_that_differ_by_rounding_are_one() {
         let apart = of_lights(&[(theta, phi), (theta - 2.0 * ROUNDING_DEG, phi)]).unwrap();
         assert_eq!(apart.lights().len(), 2);
     }
+    // A phi just below 360 is near to 0, whatever lies between.
+    let ring = [(75.0, 0.0), (75.0, 120.0), (75.0, 240.0), (75.0, 360.0 - ROUNDING_DEG)];
+    assert_eq!(of_lights(&ring).unwrap_err().lights, 3);
     // At the pole every phi is one direction, and nearly so beside it.
     assert_eq!(of_lights(&[(0.0, 0.0), (ROUNDING_DEG, 77.0), (0.0, 190.0)]).unwrap_err().lights, 1);
     // A large step of phi is a small one near the pole.

@@ -12,9 +12,6 @@ pub(super) fn base(channel: usize, channels: usize) -> Option<usize> {
     }
 }
 
-/// Samples of a block of texels of one light each, channels innermost.
-const BLOCK: usize = 64;
-
 #[inline(always)]
 fn ordered<T: Lane>(value: T, numbers: Numbers) -> T {
     match numbers {
@@ -39,21 +36,13 @@ pub(super) fn split<T: Lane>(samples: &[u8], channels: usize, numbers: Numbers, 
     if channels == 3 {
         let (red, rest) = planes.split_at_mut(stride);
         let (green, blue) = rest.split_at_mut(stride);
-        for start in (0..count).step_by(BLOCK) {
-            let n = BLOCK.min(count - start);
-            let from = &samples[start * 3 * T::BYTES..(start + n) * 3 * T::BYTES];
-            let (r, g, b) =
-                (&mut red[start..start + n], &mut green[start..start + n], &mut blue[start..start + n]);
-            let mut value = |i: usize, sample: &[u8]| {
-                let of = |c: usize| ordered(T::from_le(&sample[c * T::BYTES..(c + 1) * T::BYTES]), numbers);
-                let middle = of(1);
-                g[i] = middle;
-                r[i] = of(0).minus(middle).plus(T::HALF);
-                b[i] = of(2).minus(middle).plus(T::HALF);
-            };
-            for (i, sample) in from.chunks_exact(3 * T::BYTES).enumerate() {
-                value(i, sample);
-            }
+        let texels = red[..count].iter_mut().zip(&mut green[..count]).zip(&mut blue[..count]);
+        for (((red, green), blue), sample) in texels.zip(samples.chunks_exact(3 * T::BYTES)) {
+            let of = |c: usize| ordered(T::from_le(&sample[c * T::BYTES..(c + 1) * T::BYTES]), numbers);
+            let middle = of(1);
+            *green = middle;
+            *red = of(0).minus(middle).plus(T::HALF);
+            *blue = of(2).minus(middle).plus(T::HALF);
         }
         return;
     }

@@ -1,6 +1,6 @@
 //! From samples to residuals.
 
-use super::lane::Lane;
+use super::lane::{BLOCK, Lane, block, block_mut};
 use super::mode::{DISTANCES, Mode, Spatial, Weight};
 use super::{Masks, SLACK, Shape};
 
@@ -10,16 +10,6 @@ pub(super) struct Scratch<T> {
     residual: Vec<T>,
     lifted: Vec<T>,
     costs: Vec<T>,
-}
-
-/// Fills `out` with `f` of three slices that are at least as long, element by element.
-#[inline(always)]
-fn map3<T: Lane>(out: &mut [T], a: &[T], b: &[T], c: &[T], f: impl Fn(T, T, T) -> T) {
-    let n = out.len();
-    let (a, b, c) = (&a[..n], &b[..n], &c[..n]);
-    for i in 0..n {
-        out[i] = f(a[i], b[i], c[i]);
-    }
 }
 
 /// The median of left, above and their plane: clamping the corner does it without overflow.
@@ -61,21 +51,29 @@ fn interior<T: Lane>(
     }
     let up = shape.columns * n;
     let (above, corner) = (&plane[from - up..to - up], &plane[from - up - n..to - up - n]);
-    match spatial {
-        Spatial::Median => map3(out, left, above, corner, |l, u, c| predict(Spatial::Median, l, u, c, u)),
-        Spatial::Smooth => map3(out, left, above, corner, |l, u, c| predict(Spatial::Smooth, l, u, c, u)),
-        Spatial::Mean => {
-            // The last column has nothing above right of it.
-            let last = if columns.end == shape.columns { n } else { 0 };
-            let (body, end) = out.split_at_mut(to - from - last);
-            let right = &plane[from - up + n..];
-            map3(body, left, above, right, |l, u, r| predict(Spatial::Mean, l, u, u, r));
-            let at = body.len();
-            map3(end, &left[at..], &above[at..], &above[at..], |l, u, r| predict(Spatial::Mean, l, u, u, r));
-        }
+    // Nothing lies above right of the last column.
+    let last = if columns.end == shape.columns { n.min(to - from) } else { 0 };
+    let body = to - from - last;
+    let right = &plane[from - up + n..];
+    macro_rules! subtract {
+        ($spatial:expr, $range:expr, $right:expr) => {{
+            let range = $range;
+            let (out, here, left) = (&mut out[range.clone()], &here[range.clone()], &left[range.clone()]);
+            let (above, corner) = (&above[range.clone()], &corner[range.clone()]);
+            let right = &$right[range];
+            for i in 0..out.len() {
+                let foretold = predict($spatial, left[i], above[i], corner[i], right[i]);
+                out[i] = here[i].minus(foretold).plus(T::HALF);
+            }
+        }};
     }
-    for (out, &here) in out.iter_mut().zip(here) {
-        *out = here.minus(*out).plus(T::HALF);
+    match spatial {
+        Spatial::Median => subtract!(Spatial::Median, 0..to - from, above),
+        Spatial::Smooth => subtract!(Spatial::Smooth, 0..to - from, above),
+        Spatial::Mean => {
+            subtract!(Spatial::Mean, 0..body, right);
+            subtract!(Spatial::Mean, body..to - from, above);
+        }
     }
 }
 
@@ -135,42 +133,53 @@ fn lift<T: Lane>(residual: &[T], out: &mut [T], level: usize, weight: Weight, ma
 /// The mode that makes the residuals of two rows small.
 #[inline(always)]
 fn judge<T: Lane>(plane: &[T], shape: Shape, masks: &Masks<T>, scratch: &mut Scratch<T>) -> Mode {
-    let mut best = (u32::MAX, Mode { spatial: Spatial::Median, weights: [Weight::None; 3] });
-    let length = (shape.columns - 1) * shape.lights;
+    let n = shape.lights;
+    // The first texel is predicted otherwise; more than 15 would not fit a sum in a byte.
+    let columns = 1..shape.columns.min(16);
+    let length = columns.len() * n;
     let rows = [shape.rows / 3, shape.rows * 2 / 3];
     let rows = if rows[0] == rows[1] { &rows[..1] } else { &rows };
     let Scratch { residual, lifted, costs } = scratch;
-    let (lifted, costs) = (&mut lifted[..length], &mut costs[..length]);
+    // Blocks reach beyond the last texel.
+    lifted[length..length + BLOCK].fill(T::default());
+    let mut best = (u32::MAX, Mode { spatial: Spatial::Median, weights: [Weight::None; 3] });
     for spatial in Spatial::ALL {
-        // Sums by weight: of all residuals, then of those of each level.
-        let mut sums = [[0; 4]; 3];
-        for (weight, sums) in Weight::ALL.into_iter().zip(&mut sums) {
+        // Bits by weight: of lights without others around them, then of those of each level.
+        let mut bits = [[0; 4]; 3];
+        for (weight, bits) in Weight::ALL.into_iter().zip(&mut bits) {
             costs.fill(T::default());
             for &y in rows {
-                // The first texel is predicted otherwise.
-                interior(spatial, plane, shape, y, 1..shape.columns, &mut residual[SLACK..]);
-                lifted.copy_from_slice(&residual[SLACK..SLACK + length]);
+                interior(spatial, plane, shape, y, columns.clone(), &mut residual[SLACK..]);
+                lifted[..length].copy_from_slice(&residual[SLACK..SLACK + length]);
                 for (level, mask) in masks.iter().enumerate() {
-                    lift(residual, lifted, level, weight, mask);
+                    lift(residual, &mut lifted[..length], level, weight, mask);
                 }
-                for (cost, &residual) in costs.iter_mut().zip(&*lifted) {
-                    *cost = cost.plus(residual.minus(T::HALF).magnitude_bits());
+                for value in &mut lifted[..length] {
+                    *value = value.minus(T::HALF).magnitude_bits();
+                }
+                for texel in (0..length).step_by(n) {
+                    for start in (0..n).step_by(BLOCK) {
+                        let costs = block_mut(costs, start);
+                        let texel = block(lifted, texel + start);
+                        let mut sums = [T::default(); BLOCK];
+                        for i in 0..BLOCK {
+                            sums[i] = costs[i].plus(texel[i]);
+                        }
+                        *costs = sums;
+                    }
                 }
             }
-            let sum = |mask: Option<&Vec<T>>| -> u32 {
-                match mask {
-                    None => costs.iter().map(|cost| cost.count()).sum(),
-                    Some(mask) => costs.iter().zip(mask).map(|(cost, &mask)| cost.and(mask).count()).sum(),
-                }
-            };
-            *sums = [sum(None), sum(Some(&masks[0])), sum(Some(&masks[1])), sum(Some(&masks[2]))];
+            let all: u32 = costs[..n].iter().map(|cost| cost.count()).sum();
+            let level = |mask: &Vec<T>| -> u32 { costs[..n].iter().zip(mask).map(|(c, &m)| c.and(m).count()).sum() };
+            let levels = masks.each_ref().map(level);
+            *bits = [all - levels.iter().sum::<u32>(), levels[0], levels[1], levels[2]];
         }
-        let mut total = sums[0][0];
+        let mut total = bits[0][0];
         let weights = std::array::from_fn(|level| {
-            let of = |n: usize| sums[n][level + 1];
-            let chosen = (0..3).min_by_key(|&n| of(n)).unwrap_or(0);
-            total -= of(0) - of(chosen);
-            Weight::ALL[chosen]
+            let of = |n: usize| bits[n][level + 1];
+            let least = (0..Weight::ALL.len()).min_by_key(|&n| of(n)).unwrap_or(0);
+            total += of(least);
+            Weight::ALL[least]
         });
         if total < best.0 {
             best = (total, Mode { spatial, weights });
@@ -190,10 +199,11 @@ pub(super) fn residuals<T: Lane>(
 ) -> Mode {
     let (row, n) = (shape.columns * shape.lights, shape.lights);
     scratch.residual.resize(row + 2 * SLACK, T::HALF);
-    scratch.lifted.resize(row, T::HALF);
-    scratch.costs.resize(row, T::default());
+    scratch.lifted.resize(row + BLOCK, T::HALF);
+    scratch.costs.resize(n + BLOCK, T::default());
     let mode = judge(plane, shape, masks, scratch);
     let Scratch { residual, lifted, .. } = scratch;
+    let lifted = &mut lifted[..row];
     for y in 0..shape.rows {
         first(plane, shape, y, &mut residual[SLACK..]);
         interior(mode.spatial, plane, shape, y, 1..shape.columns, &mut residual[SLACK + n..]);

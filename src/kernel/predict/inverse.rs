@@ -1,12 +1,9 @@
 //! From residuals to samples.
 
 use super::forward::{predict, share};
-use super::lane::Lane;
+use super::lane::{BLOCK, Lane, block, block_mut};
 use super::mode::{DISTANCES, Mode, Spatial, Weight};
 use super::{Masks, SLACK, Shape};
-
-/// Samples that are handled together: one 256-bit register of bytes.
-const BLOCK: usize = 32;
 
 /// Buffers that are used again from channel to channel.
 #[derive(Default)]
@@ -39,18 +36,6 @@ fn unlift<T: Lane>(from: &[T], out: &mut [T], level: usize, weight: Weight, mask
     }
 }
 
-#[inline(always)]
-fn block<T>(slice: &[T], at: usize) -> &[T; BLOCK]
-where
-    T: Lane,
-{
-    let (block, _) = slice[at..].split_at(BLOCK);
-    match block.first_chunk() {
-        Some(block) => block,
-        None => unreachable!("split at the length of a block"),
-    }
-}
-
 /// One texel of the plane, in blocks from the last to the first. The last reaches into the texel after it, which is
 /// written later; in this order no block reads what was just overwritten in part.
 #[inline(always)]
@@ -69,7 +54,7 @@ fn texel<T: Lane>(
         for i in 0..BLOCK {
             out[i] = here[i].minus(T::HALF).plus(f(l[i], u[i], c[i], r[i]));
         }
-        plane[at + start..at + start + BLOCK].copy_from_slice(&out);
+        *block_mut(plane, at + start) = out;
     }
 }
 

@@ -2,6 +2,21 @@
 
 use std::fmt::Debug;
 
+/// Samples that are handled together: one 256-bit register of bytes.
+pub(super) const BLOCK: usize = 32;
+
+/// The block of `slice` from `at` on.
+#[inline(always)]
+pub(super) fn block<T>(slice: &[T], at: usize) -> &[T; BLOCK] {
+    &slice[at..].as_chunks().0[0]
+}
+
+/// [`block`] to write to.
+#[inline(always)]
+pub(super) fn block_mut<T>(slice: &mut [T], at: usize) -> &mut [T; BLOCK] {
+    &mut slice[at..].as_chunks_mut().0[0]
+}
+
 /// A sample as an integer whose order is that of the samples; all arithmetic is modulo 2^bits.
 pub trait Lane: Copy + Default + Eq + Ord + Debug + Send + Sync + 'static {
     /// Bytes of a sample.
@@ -42,7 +57,7 @@ pub trait Lane: Copy + Default + Eq + Ord + Debug + Send + Sync + 'static {
 }
 
 macro_rules! lane {
-    ($type:ty, $wide:ty) => {
+    ($type:ty) => {
         impl Lane for $type {
             const BYTES: usize = size_of::<Self>();
             const HALF: Self = 1 << (Self::BITS - 1);
@@ -82,7 +97,7 @@ macro_rules! lane {
             }
             #[inline(always)]
             fn mean(self, other: Self) -> Self {
-                ((<$wide>::from(self) + <$wide>::from(other) + 1) >> 1) as Self
+                (self | other) - ((self ^ other) >> 1)
             }
             #[inline(always)]
             fn zigzag(self) -> Self {
@@ -116,6 +131,6 @@ macro_rules! lane {
         }
     };
 }
-lane!(u8, u16);
-lane!(u16, u32);
-lane!(u32, u64);
+lane!(u8);
+lane!(u16);
+lane!(u32);

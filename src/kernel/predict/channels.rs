@@ -89,3 +89,23 @@ pub(super) fn join<T: Lane>(planes: &mut [T], channels: usize, numbers: Numbers,
         }
     }
 }
+
+/// Planes as they are to little-endian samples, channels innermost.
+#[inline(always)]
+pub(super) fn interleave<T: Lane>(planes: &[T], channels: usize, samples: &mut [u8]) {
+    let stride = planes.len() / channels;
+    if channels == 3 {
+        let sources = planes.iter().zip(&planes[stride..]).zip(&planes[2 * stride..]);
+        for (((&r, &g), &b), sample) in sources.zip(samples.chunks_exact_mut(3 * T::BYTES)) {
+            for (c, value) in [r, g, b].into_iter().enumerate() {
+                value.to_le(&mut sample[c * T::BYTES..(c + 1) * T::BYTES]);
+            }
+        }
+        return;
+    }
+    for (channel, plane) in planes.chunks_exact(stride).enumerate() {
+        for (&value, sample) in plane.iter().zip(samples.chunks_exact_mut(channels * T::BYTES)) {
+            value.to_le(&mut sample[channel * T::BYTES..(channel + 1) * T::BYTES]);
+        }
+    }
+}

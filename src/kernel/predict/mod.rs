@@ -6,6 +6,7 @@
 //! numbers modulo 2^bits, so every kernel gives the same bytes. `docs/codec.md` has it step by step.
 
 mod channels;
+mod deltas;
 mod forward;
 mod inverse;
 mod lane;
@@ -118,6 +119,42 @@ impl<T: Lane> Predictor<T> {
     }
 }
 
+/// Differences that stock Zarr readers undo, of chunks of one shape of whole numbers.
+pub struct Deltas<T> {
+    kernel: Kernel,
+    shape: Shape,
+    channels: usize,
+    planes: Vec<T>,
+}
+
+impl<T: Lane> Deltas<T> {
+    /// Differences of chunks of this shape, none of whose extents is 0.
+    pub fn new(kernel: Kernel, shape: Shape, channels: usize) -> Self {
+        assert!(shape.samples() * channels > 0, "an empty chunk");
+        Self { kernel, shape, channels, planes: vec![T::default(); (shape.samples() + SLACK) * channels] }
+    }
+
+    /// Differences of a chunk of little-endian samples in C order, as planes of bytes, the lowest first.
+    ///
+    /// # Panics
+    /// Unless both have as many bytes as the chunk has.
+    pub fn forward(&mut self, samples: &[u8], bytes: &mut [u8]) {
+        let expected = self.shape.samples() * T::BYTES * self.channels;
+        assert_eq!((samples.len(), bytes.len()), (expected, expected));
+        self.kernel.deltas(samples, self.shape, self.channels, &mut self.planes, bytes);
+    }
+
+    /// Inverse of [`Self::forward`].
+    ///
+    /// # Panics
+    /// Unless both have as many bytes as the chunk has.
+    pub fn inverse(&mut self, bytes: &[u8], samples: &mut [u8]) {
+        let expected = self.shape.samples() * T::BYTES * self.channels;
+        assert_eq!((samples.len(), bytes.len()), (expected, expected));
+        self.kernel.sums(bytes, self.shape, self.channels, &mut self.planes, samples);
+    }
+}
+
 /// Instructions to use, chosen once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
@@ -172,6 +209,8 @@ kernels! {
     fn join = join; (planes: &mut [T], channels: usize, numbers: Numbers, samples: &mut [u8]);
     fn residuals = forward::residuals; (plane: &[T], shape: Shape, masks: &Masks<T>, scratch: &mut forward::Scratch<T>, bytes: &mut [u8]) -> Mode;
     fn samples = inverse::samples; (bytes: &[u8], shape: Shape, mode: Mode, masks: &Masks<T>, scratch: &mut inverse::Scratch<T>, plane: &mut [T]);
+    fn deltas = deltas::forward; (samples: &[u8], shape: Shape, channels: usize, planes: &mut [T], bytes: &mut [u8]);
+    fn sums = deltas::inverse; (bytes: &[u8], shape: Shape, channels: usize, planes: &mut [T], samples: &mut [u8]);
 }
 
 #[cfg(test)]
@@ -223,6 +262,55 @@ mod tests {
                     check::<u16>(shape, channels, Numbers::Float, noise);
                     check::<u32>(shape, channels, Numbers::Float, noise);
                 }
+            }
+        }
+    }
+
+    /// `values` [shape] as an array of which axis n is axis order[n].
+    fn transpose<T: Copy>(values: &[T], shape: &[usize], order: &[usize]) -> (Vec<T>, Vec<usize>) {
+        let strides: Vec<usize> = (0..shape.len()).map(|axis| shape[axis + 1..].iter().product()).collect();
+        let new: Vec<usize> = order.iter().map(|&axis| shape[axis]).collect();
+        let place = |mut n: usize| {
+            let axes = order.iter().rev();
+            axes.map(|&axis| (n % shape[axis] * strides[axis], n /= shape[axis]).0).sum::<usize>()
+        };
+        ((0..values.len()).map(|n| values[place(n)]).collect(), new)
+    }
+
+    fn check_deltas<T: Lane>(shape: Shape, channels: usize) {
+        let samples = chunk(shape, channels, T::BYTES, 9);
+        let difference = |values: &[T]| -> Vec<T> {
+            let before = std::iter::once(T::default()).chain(values.iter().copied());
+            values.iter().zip(before).map(|(&value, before)| value.minus(before)).collect()
+        };
+        // As the module says it: axes y, x, l, c.
+        let mut values: Vec<T> = samples.chunks_exact(T::BYTES).map(T::from_le).collect();
+        if channels > 1 {
+            values = difference(&values);
+        }
+        let extent = [shape.rows, shape.columns, shape.lights, channels];
+        let (values, extent) = transpose(&values, &extent, &[3, 0, 2, 1]);
+        let (values, extent) = transpose(&difference(&values), &extent, &[0, 2, 3, 1]);
+        let (values, _) = transpose(&difference(&values), &extent, &[0, 2, 3, 1]);
+        let expected: Vec<u8> =
+            (0..T::BYTES).flat_map(|place| values.iter().map(move |value| value.byte(place))).collect();
+        for kernel in Kernel::available() {
+            let mut deltas = Deltas::<T>::new(kernel, shape, channels);
+            let (mut bytes, mut back) = (vec![0; samples.len()], vec![0; samples.len()]);
+            deltas.forward(&samples, &mut bytes);
+            assert!(bytes == expected, "{kernel:?} {shape:?} {channels}");
+            deltas.inverse(&bytes, &mut back);
+            assert!(back == samples, "{kernel:?} {shape:?} {channels}");
+        }
+    }
+
+    #[test]
+    fn differences_are_those_of_transpositions_and_flat_deltas() {
+        for (rows, columns, lights) in [(16, 16, 81), (3, 5, 7), (2, 2, 1), (1, 4, 3), (4, 1, 2)] {
+            for channels in [1, 2, 3] {
+                let shape = Shape { rows, columns, lights };
+                check_deltas::<u8>(shape, channels);
+                check_deltas::<u16>(shape, channels);
             }
         }
     }

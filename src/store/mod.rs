@@ -2,6 +2,7 @@
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
+pub mod codec;
 pub mod enlarged;
 pub mod field;
 mod lock;

@@ -48,7 +48,8 @@ pub(super) fn split<T: Lane>(samples: &[u8], channels: usize, numbers: Numbers, 
     }
     for channel in 0..channels {
         let plane = &mut planes[channel * stride..channel * stride + count];
-        let of = |sample: &[u8], c: usize| ordered(T::from_le(&sample[c * T::BYTES..(c + 1) * T::BYTES]), numbers);
+        let of =
+            |sample: &[u8], c: usize| ordered(T::from_le(&sample[c * T::BYTES..(c + 1) * T::BYTES]), numbers);
         let texels = plane.iter_mut().zip(samples.chunks_exact(channels * T::BYTES));
         match base(channel, channels) {
             None => texels.for_each(|(out, sample)| *out = of(sample, channel)),
@@ -69,7 +70,8 @@ pub(super) fn join<T: Lane>(planes: &mut [T], channels: usize, numbers: Numbers,
         let (green, blue) = rest.split_at(stride);
         let sources = red.iter().zip(green).zip(blue);
         for (((&r, &g), &b), sample) in sources.zip(samples.chunks_exact_mut(3 * T::BYTES)) {
-            for (c, value) in [r.plus(g).minus(T::HALF), g, b.plus(g).minus(T::HALF)].into_iter().enumerate() {
+            for (c, value) in [r.plus(g).minus(T::HALF), g, b.plus(g).minus(T::HALF)].into_iter().enumerate()
+            {
                 restored(value, numbers).to_le(&mut sample[c * T::BYTES..(c + 1) * T::BYTES]);
             }
         }

@@ -38,7 +38,13 @@ fn over_channels<T: Lane>(samples: &[u8], channels: usize, planes: &mut [T]) {
 
 /// Samples to differences, as planes of bytes over all channels, the lowest first.
 #[inline(always)]
-pub(super) fn forward<T: Lane>(samples: &[u8], shape: Shape, channels: usize, planes: &mut [T], bytes: &mut [u8]) {
+pub(super) fn forward<T: Lane>(
+    samples: &[u8],
+    shape: Shape,
+    channels: usize,
+    planes: &mut [T],
+    bytes: &mut [u8],
+) {
     let Shape { rows, columns, lights: n } = shape;
     let (stride, row) = (planes.len() / channels, columns * n);
     over_channels(samples, channels, planes);
@@ -98,7 +104,13 @@ pub(super) fn forward<T: Lane>(samples: &[u8], shape: Shape, channels: usize, pl
 
 /// Inverse of [`forward`].
 #[inline(always)]
-pub(super) fn inverse<T: Lane>(bytes: &[u8], shape: Shape, channels: usize, planes: &mut [T], samples: &mut [u8]) {
+pub(super) fn inverse<T: Lane>(
+    bytes: &[u8],
+    shape: Shape,
+    channels: usize,
+    planes: &mut [T],
+    samples: &mut [u8],
+) {
     let Shape { rows, columns, lights: n } = shape;
     let (stride, row) = (planes.len() / channels, columns * n);
     let total = shape.samples() * channels;

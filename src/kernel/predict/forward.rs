@@ -170,7 +170,8 @@ fn judge<T: Lane>(plane: &[T], shape: Shape, masks: &Masks<T>, scratch: &mut Scr
                 }
             }
             let all: u32 = costs[..n].iter().map(|cost| cost.count()).sum();
-            let level = |mask: &Vec<T>| -> u32 { costs[..n].iter().zip(mask).map(|(c, &m)| c.and(m).count()).sum() };
+            let level =
+                |mask: &Vec<T>| -> u32 { costs[..n].iter().zip(mask).map(|(c, &m)| c.and(m).count()).sum() };
             let levels = masks.each_ref().map(level);
             *bits = [all - levels.iter().sum::<u32>(), levels[0], levels[1], levels[2]];
         }

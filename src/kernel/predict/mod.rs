@@ -253,7 +253,9 @@ mod tests {
 
     #[test]
     fn every_kernel_gives_the_plain_residuals_and_the_samples_back() {
-        for (rows, columns, lights) in [(16, 16, 81), (8, 8, 25), (1, 1, 1), (1, 7, 3), (5, 1, 2), (3, 4, 40), (2, 9, 33)] {
+        for (rows, columns, lights) in
+            [(16, 16, 81), (8, 8, 25), (1, 1, 1), (1, 7, 3), (5, 1, 2), (3, 4, 40), (2, 9, 33)]
+        {
             let shape = Shape { rows, columns, lights };
             for channels in [1, 2, 3, 5] {
                 for noise in [0, 3, 19] {

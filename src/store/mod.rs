@@ -2,7 +2,11 @@
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
+<<<<<<< HEAD
 pub mod chunk;
+=======
+pub mod codec;
+>>>>>>> codec
 pub mod enlarged;
 pub mod field;
 pub mod gather;

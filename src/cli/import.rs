@@ -4,9 +4,9 @@ use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
-use btfkit::store::chunk::Codec;
+use btfkit::store::codec::Chain;
 use btfkit::store::measurement::Description;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 use super::source::SourceArgs;
 use super::table::{row, table};
@@ -35,21 +35,15 @@ pub(super) struct Import {
     /// Reflectance that counts as L* = 100
     #[arg(long, default_value_t = 1.0, value_parser = parse_white)]
     white: f64,
-    /// How samples are packed
-    #[arg(long, value_enum, default_value = "stock")]
-    codec: CodecName,
+    /// How samples are packed: `stock` opens with zarr-python as it is, `predictive` is smaller and faster
+    #[arg(long, value_name = "stock|predictive", default_value = "stock")]
+    codec: Chain,
     /// Import part K of N of the views (K from 0)
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum CodecName {
-    /// Codecs that stock zarr-python reads.
-    Stock,
 }
 
 fn parse_white(text: &str) -> std::result::Result<f64, String> {
@@ -108,11 +102,12 @@ impl Import {
     /// Imports one archive; `None` after a dry run.
     fn import(&self, job: &Job, context: &Context<'_>, tell: Tell) -> Result<Option<(Description, Report)>> {
         let source = self.source.open(&job.pieces)?;
-        let codec = match self.codec {
-            CodecName::Stock => Codec::Stock,
+        let options = import::Options {
+            store: job.store.clone(),
+            white: self.white,
+            codec: self.codec,
+            shard: self.shard,
         };
-        let options =
-            import::Options { store: job.store.clone(), white: self.white, codec, shard: self.shard };
         let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
             tell.plan(&plan.summary())?;

@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 use btfkit::error::Result;
 use btfkit::run::Context;
 use btfkit::stage::{cluster, estimate, import};
-use btfkit::store::chunk::Codec;
 use btfkit::store::Store;
+use btfkit::store::codec::Chain;
 use btfkit::store::enlarged::{self, Enlarged};
 use btfkit::store::measurement::{self, Description, Measurement};
 use btfkit::store::model::{self, Model, Stage};
@@ -84,9 +84,9 @@ impl Info {
         let description = import::describe(source.as_ref(), 1.0);
         let mut rows = vec![row!["kind", format!("archive, {}", contents.format)]];
         rows.extend(described(&description));
-        for codec in [Codec::Stock] {
+        for codec in [Chain::Stock, Chain::Predictive] {
             let bytes = estimate::store_bytes(source.as_ref(), codec, context)?;
-            rows.push(row![format!("store, about ({codec})"), bytes_text(bytes)]);
+            rows.push(row![format!("store, about ({})", codec.name()), bytes_text(bytes)]);
         }
         rows.extend(contents.remarks.iter().map(|(name, value)| row![name, value]));
         rows.extend(contents.assumptions.iter().map(|assumption| row!["assumed", assumption]));

@@ -29,7 +29,7 @@ use crate::shape::Size;
 use crate::stage::import::Shard;
 use crate::stage::tile::Choice;
 use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
-use crate::store::chunk::Codec;
+use crate::store::codec::Chain;
 use crate::store::enlarged::Enlarged;
 use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
@@ -177,7 +177,7 @@ fn measure(
     times.time("import", found, || {
         let source = archive::open(&[archive.to_owned()], &archive::Options::default())?;
         let options =
-            import::Options { store: store.to_owned(), white: 1.0, codec: Codec::Stock, shard: Shard::WHOLE };
+            import::Options { store: store.to_owned(), white: 1.0, codec: Chain::Stock, shard: Shard::WHOLE };
         import::plan(source.as_ref(), options, context)?.run(context).map(|_| ())
     })
 }

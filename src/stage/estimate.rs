@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::stage::import;
-use crate::store::chunk::Codec;
+use crate::store::codec::Chain;
 use crate::store::gather::Images;
 use crate::store::measurement::encoded_bytes;
 
@@ -14,7 +14,7 @@ const CHUNKS: usize = 16;
 
 /// Estimated bytes of the store: chunks of the middle view are encoded, the rest is taken to pack alike.
 /// Decodes the images of that view.
-pub fn store_bytes(source: &dyn Source, codec: Codec, context: &Context<'_>) -> Result<u64> {
+pub fn store_bytes(source: &dyn Source, codec: Chain, context: &Context<'_>) -> Result<u64> {
     let description = import::describe(source, 1.0);
     let view = description.views.len() / 2;
     let images = context.install(|| import::read_view(source, view, context))?;

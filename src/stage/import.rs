@@ -14,7 +14,7 @@ use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Size;
-use crate::store::chunk::Codec;
+use crate::store::codec::Chain;
 use crate::store::gather::Images;
 use crate::store::measurement::{Description, Measurement, Origin};
 
@@ -29,7 +29,7 @@ pub struct Options {
     /// Reflectance that counts as L* = 100.
     pub white: f64,
     /// How chunks are packed.
-    pub codec: Codec,
+    pub codec: Chain,
     /// The part of the views that this run imports.
     pub shard: Shard,
 }
@@ -118,7 +118,7 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
         "images": source.check(context)?,
         "transfer": description.transfer,
         "white": options.white,
-        "codec": options.codec,
+        "codec": options.codec.name(),
         "assumptions": contents.assumptions,
     });
     Ok(Plan { source, options, description, recipe })

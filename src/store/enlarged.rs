@@ -156,6 +156,7 @@ impl Enlarged {
 
 fn create<T: Named>(store: &Store, size: Size) -> Result<Array> {
     let layout = Layout {
+        codecs: None,
         shape: vec![size.height as u64, size.width as u64],
         chunk: vec![CHUNK_SIDE as u64; 2],
         shard: Some(vec![SHARD_SIDE as u64; 2]),
@@ -170,6 +171,7 @@ fn create_normals(store: &Store, size: Size) -> Result<Array> {
     let mut attributes = Map::new();
     attributes.insert("frame".to_owned(), json!("x right, y up, z out of the surface"));
     let layout = Layout {
+        codecs: None,
         shape: vec![size.height as u64, size.width as u64, 3],
         chunk: vec![CHUNK_SIDE as u64, CHUNK_SIDE as u64, 3],
         shard: Some(vec![SHARD_SIDE as u64, SHARD_SIDE as u64, 3]),

@@ -2,11 +2,7 @@
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
-<<<<<<< HEAD
-pub mod chunk;
-=======
 pub mod codec;
->>>>>>> codec
 pub mod enlarged;
 pub mod field;
 pub mod gather;
@@ -30,6 +26,8 @@ use zarrs::array::{
 
 use crate::error::{Error, Kind, Result};
 use crate::run::recipe;
+pub use codec::Chain;
+use codec::Codecs;
 pub use lock::Lock;
 use mapped::MappedStorage;
 
@@ -55,6 +53,8 @@ pub struct Layout<'a> {
     pub shard: Option<Vec<u64>>,
     /// Element type.
     pub data_type: DataType,
+    /// How chunks are packed; zstd where absent.
+    pub codecs: Option<Codecs>,
     /// Names of the dimensions.
     pub names: &'a [&'a str],
     /// Attributes of the array (units and the like).
@@ -72,7 +72,15 @@ impl<'a> Layout<'a> {
         if let Some(first) = chunk.first_mut() {
             *first = (*first).min((CHUNK_LIMIT_BYTES / slice_bytes).max(1));
         }
-        Self { shape, chunk, shard: None, data_type: T::data_type(), names, attributes: Map::new() }
+        Self {
+            shape,
+            chunk,
+            shard: None,
+            data_type: T::data_type(),
+            codecs: None,
+            names,
+            attributes: Map::new(),
+        }
     }
 }
 
@@ -271,9 +279,19 @@ impl Store {
         let outer = layout.shard.clone().unwrap_or_else(|| layout.chunk.clone());
         let zero = FillValue::new(vec![0; layout.data_type.fixed_size().unwrap_or(1)]);
         let mut builder = ArrayBuilder::new(layout.shape.clone(), outer, layout.data_type.clone(), zero);
+        match &layout.codecs {
+            Some(codecs) => {
+                builder
+                    .array_to_array_codecs(codecs.array_to_array.clone())
+                    .array_to_bytes_codec(codecs.array_to_bytes.clone())
+                    .bytes_to_bytes_codecs(codecs.bytes_to_bytes.clone());
+            }
+            None => {
+                // The frame's own checksum: zarrs does not verify a crc32c codec when it reads a part of a shard.
+                builder.bytes_to_bytes_codecs(vec![Arc::new(ZstdCodec::new(ZSTD_LEVEL, true))]);
+            }
+        }
         builder
-            // The frame's own checksum: zarrs does not verify a crc32c codec when it reads a part of a shard.
-            .bytes_to_bytes_codecs(vec![Arc::new(ZstdCodec::new(ZSTD_LEVEL, true))])
             .dimension_names(Some(layout.names.iter().copied()))
             .attributes(layout.attributes.clone())
             .codec_specific_options(CodecSpecificOptions::default().with_option(
@@ -288,6 +306,14 @@ impl Store {
             .store_metadata_opt(&ArrayMetadataOptions::default().with_include_zarrs_metadata(false))
             .map_err(|error| write_error(&error.into()))?;
         Ok(array)
+    }
+
+    /// The member `codecs` of an array's metadata.
+    fn array_codecs(&self, name: &str) -> Result<Value> {
+        let file = self.path.join(name).join("zarr.json");
+        let text = std::fs::read_to_string(&file).map_err(|error| Error::io("read", &file, error))?;
+        let metadata: Value = serde_json::from_str(&text).map_err(|error| self.damaged(name, &error))?;
+        Ok(metadata.get("codecs").cloned().unwrap_or_default())
     }
 
     /// Opens an array for reading.

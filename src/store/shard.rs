@@ -1,8 +1,14 @@
-//! The bytes of a shard (codec `sharding_indexed` of Zarr v3, index at the end), put together from its
-//! encoded chunks so that they can be encoded by many threads and still lie in one order.
+//! The bytes of a shard (codec `sharding_indexed` of Zarr v3, index at the end): put together from encoded
+//! chunks so that they can be encoded by many threads and still lie in one order, and taken apart so that they can be
+//! decoded by many.
+
+use std::ops::Range;
 
 /// A chunk that lies wholly beyond the array: absent, it reads as the fill value.
 const ABSENT: u64 = u64::MAX;
+
+/// Bytes of the index for each chunk: offset and length.
+const ENTRY_BYTES: usize = 16;
 
 /// The shard of these chunks, which are in C order of their places; `None` for one beyond the array.
 ///
@@ -10,8 +16,8 @@ const ABSENT: u64 = u64::MAX;
 /// the crc32c of this index, u32.
 pub(super) fn assemble(chunks: &[Option<Vec<u8>>]) -> Vec<u8> {
     let data: usize = chunks.iter().flatten().map(Vec::len).sum();
-    let mut shard = Vec::with_capacity(data + 16 * chunks.len() + 4);
-    let mut index = Vec::with_capacity(16 * chunks.len());
+    let mut shard = Vec::with_capacity(data + ENTRY_BYTES * chunks.len() + 4);
+    let mut index = Vec::with_capacity(ENTRY_BYTES * chunks.len());
     for chunk in chunks {
         let (offset, length) = match chunk {
             Some(bytes) => (shard.len() as u64, bytes.len() as u64),
@@ -24,4 +30,59 @@ pub(super) fn assemble(chunks: &[Option<Vec<u8>>]) -> Vec<u8> {
     shard.extend_from_slice(&index);
     shard.extend(crc32c::crc32c(&index).to_le_bytes());
     shard
+}
+
+/// Where the chunks of a shard lie in it, in C order of their places; `None` for those that are absent.
+///
+/// # Errors
+/// Says what is wrong with the index.
+pub(super) fn chunk_ranges(shard: &[u8], chunks: usize) -> Result<Vec<Option<Range<usize>>>, String> {
+    let index_bytes = ENTRY_BYTES * chunks;
+    let data = shard.len().checked_sub(index_bytes + 4).ok_or_else(|| {
+        format!("got {} bytes, expected at least the index of {chunks} chunks", shard.len())
+    })?;
+    let (index, checksum) = shard[data..].split_at(index_bytes);
+    let found = crc32c::crc32c(index).to_le_bytes();
+    if checksum != found {
+        return Err("the index does not have its checksum".to_owned());
+    }
+    index
+        .as_chunks::<ENTRY_BYTES>()
+        .0
+        .iter()
+        .map(|entry| {
+            let [offset, length] =
+                [0, 8].map(|at| u64::from_le_bytes(std::array::from_fn(|byte| entry[at + byte])));
+            if (offset, length) == (ABSENT, ABSENT) {
+                return Ok(None);
+            }
+            let end = offset.checked_add(length).filter(|&end| end <= data as u64);
+            let end = end.ok_or_else(|| format!("a chunk at {offset} of {length} bytes in {data}"))?;
+            Ok(Some(offset as usize..end as usize))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_shard_gives_its_chunks_back_and_a_damaged_index_is_refused() {
+        let chunks = [Some(vec![1, 2, 3]), None, Some(vec![]), Some(vec![4; 9])];
+        let shard = assemble(&chunks);
+        let ranges = chunk_ranges(&shard, 4).unwrap();
+        let found: Vec<Option<Vec<u8>>> =
+            ranges.into_iter().map(|range| range.map(|range| shard[range].to_vec())).collect();
+        assert_eq!(found, chunks);
+        for end in 0..shard.len() {
+            assert!(chunk_ranges(&shard[..end], 4).is_err(), "{end}");
+        }
+        for bit in 12 * 8..shard.len() * 8 {
+            let mut flipped = shard.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            assert!(chunk_ranges(&flipped, 4).is_err(), "{bit}");
+        }
+    }
 }

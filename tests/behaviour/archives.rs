@@ -24,7 +24,12 @@ fn value(view: usize, light: usize, y: usize, x: usize, channel: usize) -> f32 {
 }
 
 /// Writes that measurement as pictures named by a pattern; returns the folder.
-fn pictures(folder: &Path, extension: &str, channels: &[&str], name: impl Fn(usize, usize) -> String) -> PathBuf {
+fn pictures(
+    folder: &Path,
+    extension: &str,
+    channels: &[&str],
+    name: impl Fn(usize, usize) -> String,
+) -> PathBuf {
     let root = folder.join(format!("pictures-{extension}"));
     std::fs::create_dir_all(&root).unwrap();
     for v in 0..2 {
@@ -67,7 +72,8 @@ fn exports_that_are_lossless_come_back_sample_by_sample() {
         for v in [0, 5] {
             let (found, expected) = (view(&again, v), view(&measured, v));
             if format == "exr" {
-                let codes = (0..found.len()).map(|at| btfkit::color::srgb_encode_u8(found.value(at).unwrap()));
+                let codes =
+                    (0..found.len()).map(|at| btfkit::color::srgb_encode_u8(found.value(at).unwrap()));
                 assert_eq!(Samples::U8(codes.collect()), expected);
             } else {
                 assert_eq!(found, expected, "{format}, view {v}");
@@ -97,7 +103,9 @@ fn containers_of_bonn_are_exact_at_full_rank_and_near_at_a_lower_one() {
         };
         (0..samples.len()).map(|at| curve.decode(samples.value(at).unwrap())).collect()
     };
-    for (format, rank, most) in [("dfmf", None, 5e-4), ("fmf", None, 5e-4), ("dfmf", Some("12"), 0.2), ("fmf", Some("20"), 0.2)] {
+    for (format, rank, most) in
+        [("dfmf", None, 5e-4), ("fmf", None, 5e-4), ("dfmf", Some("12"), 0.2), ("fmf", Some("20"), 0.2)]
+    {
         let archive = folder.path().join(format!("{format}-{}.btf", rank.unwrap_or("full")));
         let again = archive.with_extension("zarr");
         let mut export = btf();
@@ -165,7 +173,8 @@ fn pictures_are_found_by_names_pattern_table_and_light_list() {
 fn spectral_pictures_keep_their_channels_and_have_a_luminance() {
     let folder = tempfile::tempdir().unwrap();
     let channels = ["450nm", "550nm", "650nm", "750nm"];
-    let root = pictures(folder.path(), "exr", &channels, |v, l| format!("tv{}_pv0_tl30_pl{}", 15 * v, 120 * l));
+    let root =
+        pictures(folder.path(), "exr", &channels, |v, l| format!("tv{}_pv0_tl30_pl{}", 15 * v, 120 * l));
     let store = folder.path().join("spectral.zarr");
     import(&[&root], &store, &[]);
     let measurement = Measurement::open(&store).unwrap();
@@ -184,7 +193,13 @@ fn floats_go_through_the_whole_method() {
     import(&[&archive], &store, &["--samples", "f16"]);
     succeed(btf().arg("model").args([&store, &model]).args(["--clusters", "24"]));
     succeed(btf().arg("enlarge").args([&model, &big]).args(["--size", "64x64"]));
-    succeed(btf().arg("image").arg(&big).args(["--light", "15,0", "--view", "0,0", "--out"]).arg(folder.path().join("f.png")));
+    succeed(
+        btf()
+            .arg("image")
+            .arg(&big)
+            .args(["--light", "15,0", "--view", "0,0", "--out"])
+            .arg(folder.path().join("f.png")),
+    );
     succeed(btf().arg("compare").args([&model, &store]));
     // The same codes, so the same clusters as the 8-bit samples.
     let index = |model: &Path| tree(&model.join("index"));
@@ -246,7 +261,8 @@ fn pieces_of_one_measurement_are_joined() {
         let mut zip = btfkit_formats::zip::ZipWriter::new(Vec::new());
         for file in std::fs::read_dir(&view).unwrap() {
             let file = file.unwrap().path();
-            zip.write_entry(file.file_name().unwrap().to_str().unwrap(), &std::fs::read(&file).unwrap()).unwrap();
+            zip.write_entry(file.file_name().unwrap().to_str().unwrap(), &std::fs::read(&file).unwrap())
+                .unwrap();
         }
         let piece = zips.join(format!("{}.zip", view.file_name().unwrap().to_str().unwrap()));
         std::fs::write(&piece, zip.finish().unwrap()).unwrap();

@@ -75,7 +75,9 @@ fn another_archive_is_told_apart() {
 #[test]
 fn shards_in_any_number_and_order_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
-    for shards in [&["0/1"][..], &["2/4", "0/4", "2/4", "3/4", "1/4"], &["1/2", "0/2"], &["0/20", "8/9", "0/1"]] {
+    for shards in
+        [&["0/1"][..], &["2/4", "0/4", "2/4", "3/4", "1/4"], &["1/2", "0/2"], &["0/20", "8/9", "0/1"]]
+    {
         let store = folder.path().join(format!("s{}.zarr", shards.len()));
         for shard in shards {
             succeed(btf().arg("import").args([&fixture().archive(), &store]).args(["--shard", shard]));

@@ -1,12 +1,12 @@
 //! What a measurement holds: sizes, directions, and how samples are meant.
 
-use btfkit_formats::SampleType;
-
 use super::CHUNK_SIDE;
 use crate::color::{Decoder, LightnessCodes, Transfer};
 use crate::error::Result;
+use crate::kernel::predict::Shape;
 use crate::shape::Size;
-use btfkit_formats::Direction;
+use crate::store::codec::Chunk;
+use btfkit_formats::{Direction, SampleType};
 
 /// Most bytes of samples in one shard.
 pub(super) const SHARD_LIMIT_BYTES: usize = 256 << 20;
@@ -51,16 +51,18 @@ impl Description {
         CHUNK_SIDE
     }
 
-    /// Shape of a chunk of samples.
-    pub(super) fn chunk_shape(&self) -> Vec<u64> {
-        let mut shape = self.code_chunk_shape();
-        shape.push(self.n_channels() as u64);
-        shape
+    /// A chunk of samples.
+    pub(super) fn chunk(&self) -> Chunk {
+        Chunk { samples: self.sample_type, shape: self.chunk_shape(), channels: Some(self.n_channels()) }
     }
 
-    /// Shape of a chunk of L* codes.
-    pub(super) fn code_chunk_shape(&self) -> Vec<u64> {
-        vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, self.lights.len() as u64]
+    /// A chunk of L* codes.
+    pub(super) fn code_chunk(&self) -> Chunk {
+        Chunk { samples: SampleType::U8, shape: self.chunk_shape(), channels: None }
+    }
+
+    fn chunk_shape(&self) -> Shape {
+        Shape { rows: CHUNK_SIDE, columns: CHUNK_SIDE, lights: self.lights.len() }
     }
 
     /// Bytes of one view's samples.

@@ -9,6 +9,7 @@
 //! One shard is one view (of a part of the plane), so a view is the unit of an import.
 
 mod description;
+mod read;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -19,13 +20,13 @@ use serde_json::{Map, Value, json};
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::shape::{Size, Window};
-use crate::store::chunk::Codec;
+use crate::store::codec::{Chain, chunk_codecs};
 use crate::store::{Array, Layout, Named, Store};
 use crate::views::Views;
 use btfkit_formats::Direction;
 pub use description::Description;
-pub(crate) use write::encoded_bytes;
 use description::SHARD_LIMIT_BYTES;
+pub(crate) use write::encoded_bytes;
 
 /// The attribute `kind` of a measurement store.
 pub const KIND: &str = "measurement";
@@ -40,7 +41,7 @@ pub struct Measurement {
     digest: String,
     /// Side of a shard in texels.
     side: usize,
-    codec: Codec,
+    codec: Chain,
     reflectance: Array,
     luminance: Array,
 }
@@ -50,14 +51,14 @@ impl Measurement {
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
-    pub fn create(path: &Path, description: Description, codec: Codec, origin: &Origin<'_>) -> Result<Self> {
+    pub fn create(path: &Path, description: Description, codec: Chain, origin: &Origin<'_>) -> Result<Self> {
         Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES)
     }
 
     fn create_in_shards(
         path: &Path,
         description: Description,
-        codec: Codec,
+        codec: Chain,
         origin: &Origin<'_>,
         limit_bytes: usize,
     ) -> Result<Self> {
@@ -75,8 +76,8 @@ impl Measurement {
         write_directions(&store, "view_direction", "view", &description.views)?;
         write_directions(&store, "light_direction", "light", &description.lights)?;
         let side = description.shard_side(limit_bytes);
-        let reflectance = create_reflectance(&store, &description, side)?;
-        let luminance = create_luminance(&store, &description, side)?;
+        let reflectance = create_reflectance(&store, &description, codec, side)?;
+        let luminance = create_luminance(&store, &description, codec, side)?;
         Ok(Self { store, description, digest: recipe::digest(recipe), side, codec, reflectance, luminance })
     }
 
@@ -138,7 +139,13 @@ impl Measurement {
             .ok()
             .and_then(|shape| shape.get(1).map(|side| side.get() as usize))
             .ok_or_else(|| damaged("reflectance: no shard shape".to_owned()))?;
-        Ok(Self { store, description, digest, side, codec: Codec::Stock, reflectance, luminance })
+        let codec = Chain::of(&store.array_codecs("reflectance")?, &description.chunk());
+        let codec = codec.ok_or_else(|| damaged("reflectance: its codecs are not ours".to_owned()))?;
+        let codes = Chain::of(&store.array_codecs("luminance")?, &description.code_chunk());
+        if codes != Some(codec) || !side.is_multiple_of(CHUNK_SIDE) {
+            return Err(damaged("luminance: other codecs than those of reflectance".to_owned()));
+        }
+        Ok(Self { store, description, digest, side, codec, reflectance, luminance })
     }
 
     /// What it holds.
@@ -154,7 +161,10 @@ impl Measurement {
     /// What its import had to assume because the archive does not say it.
     pub fn assumptions(&self) -> Vec<String> {
         let found = self.store.attributes().ok().flatten().unwrap_or_default();
-        found.get("assumptions").and_then(|list| serde_json::from_value(list.clone()).ok()).unwrap_or_default()
+        found
+            .get("assumptions")
+            .and_then(|list| serde_json::from_value(list.clone()).ok())
+            .unwrap_or_default()
     }
 
     /// Where it lies.
@@ -211,25 +221,6 @@ impl Measurement {
         let across = width.div_ceil(side) as u64;
         (0..height.div_ceil(side) as u64).flat_map(move |sy| (0..across).map(move |sx| (sy, sx)))
     }
-
-    /// Samples of a window under one view, [y, x, light, channel].
-    pub fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
-        let Window { y, x, size } = window;
-        let start = [view as u64, y as u64, x as u64, 0, 0];
-        let [lights, channels] = [self.description.lights.len(), self.description.n_channels()];
-        let extent = [1, size.height as u64, size.width as u64, lights as u64, channels as u64];
-        self.store.read_samples(&self.reflectance, self.description.sample_type, &start, &extent)
-    }
-
-    /// L* codes of a window under one view, [y, x, light].
-    pub fn read_luminance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
-        let Window { y, x, size } = window;
-        self.store.read_box(
-            &self.luminance,
-            &[view as u64, y as u64, x as u64, 0],
-            &[1, size.height as u64, size.width as u64, self.description.lights.len() as u64],
-        )
-    }
 }
 
 impl Views for Measurement {
@@ -271,7 +262,7 @@ pub struct Origin<'a> {
     pub remarks: &'a [(String, String)],
 }
 
-fn create_reflectance(store: &Store, description: &Description, side: usize) -> Result<Array> {
+fn create_reflectance(store: &Store, description: &Description, codec: Chain, side: usize) -> Result<Array> {
     let names = ["view", "y", "x", "light", "channel"];
     let mut layout = sample_layout(description, &names, description.n_channels(), side);
     layout.data_type = crate::store::data_type_of(description.sample_type);
@@ -283,15 +274,17 @@ fn create_reflectance(store: &Store, description: &Description, side: usize) -> 
     };
     let units = format!("reflectance, {one}, through the transfer curve of the group");
     layout.attributes.insert("units".to_owned(), json!(units));
+    layout.codecs = Some(chunk_codecs(codec, &description.chunk())?);
     store.create_array("reflectance", &layout)
 }
 
-fn create_luminance(store: &Store, description: &Description, side: usize) -> Result<Array> {
+fn create_luminance(store: &Store, description: &Description, codec: Chain, side: usize) -> Result<Array> {
     let mut layout = sample_layout(description, &["view", "y", "x", "light"], 1, side);
     layout.shape.pop();
     layout.chunk.pop();
     layout.shard.as_mut().map(Vec::pop);
     layout.attributes.insert("units".to_owned(), json!("CIE 1976 L* (D65), code = round(2.55 L*)"));
+    layout.codecs = Some(chunk_codecs(codec, &description.code_chunk())?);
     store.create_array("luminance", &layout)
 }
 
@@ -310,6 +303,7 @@ fn sample_layout<'a>(
         chunk: vec![1, CHUNK_SIDE as u64, CHUNK_SIDE as u64, lights, channels],
         shard: Some(vec![1, side, side, lights, channels]),
         data_type: u8::data_type(),
+        codecs: None,
         names,
         attributes: Map::new(),
     }
@@ -389,7 +383,7 @@ mod tests {
             let measurement = Measurement::create_in_shards(
                 folder.path(),
                 description.clone(),
-                Codec::Stock,
+                Chain::Stock,
                 &origin,
                 limit,
             )

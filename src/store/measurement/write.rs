@@ -6,7 +6,7 @@ use super::{CHUNK_SIDE, Description, Measurement};
 use crate::color::{LightnessCodes, Remarkable};
 use crate::error::Result;
 use crate::shape::{Size, Window};
-use crate::store::chunk::{Codec, Encoder};
+use crate::store::codec::{Chain, ChunkCodec};
 use crate::store::gather::{self, Images};
 use crate::store::shard;
 
@@ -25,9 +25,17 @@ impl Measurement {
             let encoder = || Encoders::new(&self.description, self.codec);
             let chunks: Vec<Option<Encoded>> = places
                 .par_iter()
-                .map_init(encoder, |encoders, window| {
-                    window.map(|window| self.encode(encoders, images, codes, window)).transpose()
-                })
+                .map_init(
+                    || None,
+                    |encoders, window| {
+                        let Some(window) = *window else { return Ok(None) };
+                        let encoders = match encoders {
+                            Some(encoders) => encoders,
+                            none => none.insert(encoder()?),
+                        };
+                        self.encode(encoders, images, codes, window).map(Some)
+                    },
+                )
                 .collect::<Result<_>>()?;
             let (mut reflectance, mut luminance) = (Vec::new(), Vec::new());
             for chunk in chunks {
@@ -64,7 +72,8 @@ impl Measurement {
         let mut luminance = vec![0; window.size.texels() * self.description.lights.len()];
         let all = codes.fill(&samples, &mut luminance);
         let remarkable = self.inside(window, all, &samples, codes);
-        Ok((encoders.samples.encode(gather::bytes(&samples))?, encoders.codes.encode(&luminance)?, remarkable))
+        let (samples, codes) = encoders.encode(gather::bytes(&samples), &luminance)?;
+        Ok((samples, codes, remarkable))
     }
 
     /// What was found in the part of a chunk that lies within the plane.
@@ -96,30 +105,38 @@ impl Measurement {
 
 /// What one thread encodes with.
 struct Encoders {
-    samples: Encoder,
-    codes: Encoder,
+    samples: ChunkCodec,
+    codes: ChunkCodec,
 }
 
 impl Encoders {
-    fn new(description: &Description, codec: Codec) -> Self {
-        Self {
-            samples: Encoder::new(codec, description.chunk_shape()),
-            codes: Encoder::new(codec, description.code_chunk_shape()),
-        }
+    fn new(description: &Description, codec: Chain) -> Result<Self> {
+        Ok(Self {
+            samples: ChunkCodec::new(codec, description.chunk())?,
+            codes: ChunkCodec::new(codec, description.code_chunk())?,
+        })
+    }
+
+    /// A chunk of samples and one of codes, encoded.
+    fn encode(&mut self, samples: &[u8], codes: &[u8]) -> Result<(Vec<u8>, Vec<u8>)> {
+        let mut encoded = (Vec::new(), Vec::new());
+        self.samples.encode(samples, &mut encoded.0)?;
+        self.codes.encode(codes, &mut encoded.1)?;
+        Ok(encoded)
     }
 }
 
 /// Bytes that a chunk of both arrays takes, encoded.
 pub(crate) fn encoded_bytes(
     description: &Description,
-    codec: Codec,
+    codec: Chain,
     codes: &LightnessCodes,
     images: &Images,
     window: Window,
 ) -> Result<usize> {
-    let mut encoders = Encoders::new(description, codec);
     let samples = images.gather(window);
     let mut luminance = vec![0; window.size.texels() * description.lights.len()];
     codes.fill(&samples, &mut luminance);
-    Ok(encoders.samples.encode(gather::bytes(&samples))?.len() + encoders.codes.encode(&luminance)?.len())
+    let (samples, codes) = Encoders::new(description, codec)?.encode(gather::bytes(&samples), &luminance)?;
+    Ok(samples.len() + codes.len())
 }

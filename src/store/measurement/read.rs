@@ -1,0 +1,159 @@
+//! Reading a window of one view: the chunks that it touches, decoded by many threads straight from the mapped
+//! shards, and cut to the window.
+
+use std::ops::Range;
+
+use btfkit_formats::{SampleType, Samples, f16};
+use rayon::prelude::*;
+
+use super::{CHUNK_SIDE, Measurement, SampleArray};
+use crate::error::{Error, Result};
+use crate::shape::{Size, Window};
+use crate::store::codec::{Chunk, ChunkCodec};
+use crate::store::mapped::MappedFile;
+use crate::store::shard;
+
+/// A shard, and where its chunks lie in it.
+struct Shard {
+    file: MappedFile,
+    chunks: Vec<Option<Range<usize>>>,
+}
+
+impl Measurement {
+    /// Samples of a window under one view, [y, x, light, channel].
+    ///
+    /// # Errors
+    /// [`crate::Kind::Missing`] where a shard of it has not been written, [`crate::Kind::Input`] where one is damaged.
+    pub fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
+        let bytes = self.read_window(SampleArray::Reflectance, self.description.chunk(), view, window)?;
+        Ok(match self.description.sample_type {
+            SampleType::U8 => Samples::U8(bytes),
+            SampleType::U16 => Samples::U16(cast(&bytes)),
+            SampleType::F16 => Samples::F16(cast::<f16>(&bytes)),
+            SampleType::F32 => Samples::F32(cast(&bytes)),
+        })
+    }
+
+    /// L* codes of a window under one view, [y, x, light].
+    ///
+    /// # Errors
+    /// As [`Measurement::read_reflectance`].
+    pub fn read_luminance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
+        self.read_window(SampleArray::Luminance, self.description.code_chunk(), view, window)
+    }
+
+    /// Bytes of a window of an array, texel by texel.
+    fn read_window(&self, array: SampleArray, chunk: Chunk, view: usize, window: Window) -> Result<Vec<u8>> {
+        if view >= self.description.views.len() || !window.fits(self.description.size) {
+            return Err(Error::input(format!(
+                "{}: asked for {window} of view {view}, there are {} views of {}",
+                self.path().display(),
+                self.description.views.len(),
+                self.description.size
+            )));
+        }
+        let texel_bytes = chunk.bytes() / (CHUNK_SIDE * CHUNK_SIDE);
+        let row_bytes = window.size.width * texel_bytes;
+        let mut bytes = vec![0; window.size.height * row_bytes];
+        let shards = self.open_shards(array, view, window)?;
+        // Bands of the window that lie in one row of chunks each; every band is one thread's.
+        let mut bands = Vec::new();
+        let (mut rest, mut y) = (bytes.as_mut_slice(), window.y);
+        while y < window.y + window.size.height {
+            let end = ((y / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.y + window.size.height);
+            let (band, later) = rest.split_at_mut((end - y) * row_bytes);
+            bands.push((y..end, band));
+            (rest, y) = (later, end);
+        }
+        let read_band =
+            |codec: &mut Option<(ChunkCodec, Vec<u8>)>, rows: Range<usize>, band: &mut [u8]| -> Result<()> {
+                let (codec, texels) = match codec {
+                    Some(codec) => codec,
+                    none => none.insert((ChunkCodec::new(self.codec, chunk)?, vec![0; chunk.bytes()])),
+                };
+                let mut x = window.x;
+                while x < window.x + window.size.width {
+                    let end = ((x / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.x + window.size.width);
+                    self.decode(&shards, array, view, [rows.start, x], codec, texels)?;
+                    let columns = (end - x) * texel_bytes;
+                    for (number, row) in rows.clone().enumerate() {
+                        let from = (row % CHUNK_SIDE * CHUNK_SIDE + x % CHUNK_SIDE) * texel_bytes;
+                        let to = number * row_bytes + (x - window.x) * texel_bytes;
+                        band[to..to + columns].copy_from_slice(&texels[from..from + columns]);
+                    }
+                    x = end;
+                }
+                Ok(())
+            };
+        bands
+            .into_par_iter()
+            .try_for_each_init(|| None, |codec, (rows, band)| read_band(codec, rows, band))?;
+        Ok(bytes)
+    }
+
+    /// Decodes the chunk that holds a texel.
+    fn decode(
+        &self,
+        shards: &[([usize; 2], Shard)],
+        array: SampleArray,
+        view: usize,
+        [y, x]: [usize; 2],
+        codec: &mut ChunkCodec,
+        texels: &mut [u8],
+    ) -> Result<()> {
+        let damaged = |what: &str| {
+            let window = Window { y, x, size: Size::new(1, 1) };
+            Error::input(format!(
+                "{}: chunk at row {}, column {}: {what}",
+                self.shard_path(array, view, window).display(),
+                y / CHUNK_SIDE * CHUNK_SIDE,
+                x / CHUNK_SIDE * CHUNK_SIDE
+            ))
+            .hint("the store is damaged: delete this file and run the command that made it again")
+        };
+        let place = [y / self.side, x / self.side];
+        let shard = shards.iter().find(|(at, _)| *at == place).map(|(_, shard)| shard);
+        let shard = shard.ok_or_else(|| Error::internal("a shard that was not opened"))?;
+        let across = self.side / CHUNK_SIDE;
+        let number = y % self.side / CHUNK_SIDE * across + x % self.side / CHUNK_SIDE;
+        let range = shard.chunks.get(number).cloned().flatten().ok_or_else(|| damaged("it is absent"))?;
+        let bytes = shard.file.as_ref().get(range).ok_or_else(|| damaged("it lies beyond the file"))?;
+        codec.decode(bytes, texels).map_err(|error| damaged(&error.to_string()))
+    }
+
+    /// Maps the shards that a window touches.
+    fn open_shards(
+        &self,
+        array: SampleArray,
+        view: usize,
+        window: Window,
+    ) -> Result<Vec<([usize; 2], Shard)>> {
+        let places = |start: usize, length: usize| start / self.side..(start + length).div_ceil(self.side);
+        let columns = places(window.x, window.size.width);
+        let across = self.side / CHUNK_SIDE;
+        places(window.y, window.size.height)
+            .flat_map(|sy| columns.clone().map(move |sx| [sy, sx]))
+            .map(|[sy, sx]| {
+                let corner = Window { y: sy * self.side, x: sx * self.side, size: Size::new(1, 1) };
+                let path = self.shard_path(array, view, corner);
+                let file = MappedFile::open(&path).map_err(|error| match error.kind() {
+                    std::io::ErrorKind::NotFound => {
+                        Error::missing(format!("{}: this shard has not been written", path.display()))
+                            .hint("run the command that makes this store again; it goes on where it stopped")
+                    }
+                    _ => Error::io("read", &path, error),
+                })?;
+                let chunks = shard::chunk_ranges(file.as_ref(), across * across).map_err(|what| {
+                    Error::input(format!("{}: {what}", path.display()))
+                        .hint("the store is damaged: delete this file and run the command that made it again")
+                })?;
+                Ok(([sy, sx], Shard { file, chunks }))
+            })
+            .collect()
+    }
+}
+
+/// Bytes as values; a vector of bytes may lie at an odd address, so they are copied.
+fn cast<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(bytes: &[u8]) -> Vec<T> {
+    bytemuck::pod_collect_to_vec(bytes)
+}

@@ -367,3 +367,29 @@ fn counters_of_a_dwa_chunk_reserve_no_memory() {
     }
     assert_eq!(noticed, 36);
 }
+
+/// The decompressor calculates without a check for it.
+#[test]
+fn a_b44_block_that_leads_below_the_least_half_is_refused() {
+    let picture = exr_picture(4, 4, &["Y"], true);
+    let whole = exr_by_crate(&picture, exr::prelude::Compression::B44, None);
+    assert!(decode(&whole, &Limits::default()).is_ok());
+    // The only chunk is one block of 14 bytes: no first sample, no shift, and differences of -32.
+    let start = whole.len() - 14;
+    let mut low = whole.clone();
+    low[start..].fill(0);
+    refuse_only_when_decoded(&low, "least half");
+    // Differences of none.
+    let none = (0..15).fold(0u128, |bits, _| bits << 6 | 32);
+    low[start..].copy_from_slice(&none.to_be_bytes()[2..]);
+    let Samples::F16(read) = decode(&low, &Limits::default()).unwrap().samples else { unreachable!() };
+    assert!(read.iter().all(|sample| sample.to_bits() == !0));
+}
+
+#[track_caller]
+fn refuse_only_when_decoded(bytes: &[u8], words: &str) {
+    assert!(check(bytes, &Limits::default()).is_ok());
+    let error = decode(bytes, &Limits::default()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Malformed);
+    assert!(error.to_string().contains(words), "{error}");
+}

@@ -16,6 +16,7 @@ mod chunks;
 mod encode;
 mod header;
 mod pixels;
+mod trusted;
 
 pub use encode::{Compression, encode};
 

@@ -6,8 +6,8 @@
 //! (Orientation), JPEG and fax inside a TIFF.
 //!
 //! The layout of the file and the predictors are read here, and crates unpack LZW and deflate. (The crate `tiff`
-//! multiplies what the directory says before it has held it against anything, refuses valid LZW tiles at the edge
-//! of a picture, misplaces tiles of separate planes and verifies no checksum of deflate.)
+//! multiplies what the directory says before it has held it against anything, refuses some valid LZW tiles at the edge
+//! of a picture, and verifies no checksum of deflate.)
 
 mod decompress;
 mod directory;

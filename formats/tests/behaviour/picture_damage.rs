@@ -207,6 +207,45 @@ fn a_tiff_that_lies_about_its_strips_is_refused() {
 }
 
 #[test]
+fn a_tiff_strip_that_unpacks_to_more_or_less_or_wrongly_is_refused() {
+    let raw: Vec<u8> = (0..16).collect();
+    let with = |compression: u64, strip: &[u8]| {
+        let mut tiff = Tiff::new((4, 4, 1), 8, 1, 4);
+        tiff.chunks.push(strip.to_vec());
+        decode(&tiff.set(259, &[compression]).bytes(), &Limits::default())
+    };
+    let refused = |compression, strip: &[u8], words: &str| {
+        let error = with(compression, strip).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Malformed);
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let good = deflated(&raw);
+    assert_eq!(with(8, &good).unwrap().samples, Samples::U8(raw.clone()));
+    refused(8, &deflated(&raw[..15]), "15 bytes unpacked");
+    refused(8, &deflated(&[raw.as_slice(), &[0; 1000]].concat()), "17 bytes unpacked");
+    let mut wrong = good.clone();
+    *wrong.last_mut().unwrap() ^= 1;
+    refused(8, &wrong, "do not inflate");
+    refused(8, &good[..good.len() - 3], "do not inflate");
+
+    let packed = [[7u8].as_slice(), &raw[..8], &[128, 7], &raw[8..]].concat();
+    assert_eq!(with(32773, &packed).unwrap().samples, Samples::U8(raw.clone()));
+    refused(32773, &packed[..packed.len() - 1], "end of the data");
+    refused(32773, &[241 - 1, 5], "17 bytes unpacked");
+    assert_eq!(with(32773, &[241, 5]).unwrap().samples, Samples::U8(vec![5; 16]));
+
+    // Clear, 16 codes of 9 bits, end; then without its last bytes, and with its bits in the other order.
+    let codes = std::iter::once(256).chain(0..16).chain([257]);
+    let bits: Vec<u8> =
+        codes.flat_map(|code: u16| (0..9).rev().map(move |bit| (code >> bit & 1) as u8)).collect();
+    let byte = |bits: &[u8]| bits.iter().enumerate().fold(0, |sum, (i, bit)| sum | bit << (7 - i));
+    let lzw: Vec<u8> = bits.chunks(8).map(byte).collect();
+    assert_eq!(with(5, &lzw).unwrap().samples, Samples::U8(raw));
+    refused(5, &lzw[..12], "bytes unpacked");
+    refused(5, &[&[0, 1], &lzw[2..]].concat(), "clear code");
+}
+
+#[test]
 fn a_tiff_whose_directories_form_a_loop_or_are_nowhere_is_refused() {
     let mut looped = small_tiff();
     looped.next = 8;
@@ -327,4 +366,30 @@ fn counters_of_a_dwa_chunk_reserve_no_memory() {
         }
     }
     assert_eq!(noticed, 36);
+}
+
+/// The decompressor calculates without a check for it.
+#[test]
+fn a_b44_block_that_leads_below_the_least_half_is_refused() {
+    let picture = exr_picture(4, 4, &["Y"], true);
+    let whole = exr_by_crate(&picture, exr::prelude::Compression::B44, None);
+    assert!(decode(&whole, &Limits::default()).is_ok());
+    // The only chunk is one block of 14 bytes: no first sample, no shift, and differences of -32.
+    let start = whole.len() - 14;
+    let mut low = whole.clone();
+    low[start..].fill(0);
+    refuse_only_when_decoded(&low, "least half");
+    // Differences of none.
+    let none = (0..15).fold(0u128, |bits, _| bits << 6 | 32);
+    low[start..].copy_from_slice(&none.to_be_bytes()[2..]);
+    let Samples::F16(read) = decode(&low, &Limits::default()).unwrap().samples else { unreachable!() };
+    assert!(read.iter().all(|sample| sample.to_bits() == !0));
+}
+
+#[track_caller]
+fn refuse_only_when_decoded(bytes: &[u8], words: &str) {
+    assert!(check(bytes, &Limits::default()).is_ok());
+    let error = decode(bytes, &Limits::default()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Malformed);
+    assert!(error.to_string().contains(words), "{error}");
 }

@@ -11,6 +11,7 @@ use exr::meta::header::Header as ChunkHeader;
 use super::channels::Channel;
 use super::chunks::Chunk;
 use super::header::Header;
+use super::trusted;
 use crate::picture::alpha::not_opaque;
 use crate::picture::size::unsupported;
 use crate::reader::Reader;
@@ -142,15 +143,7 @@ fn size((width, height): (u32, u32)) -> Vec2<usize> {
 /// Lines from the top, in a line channels as in the file, in a channel samples from the left, in the machine's byte order.
 fn decompress(bytes: &[u8], chunk: &Chunk, header: &Header, chunk_header: &ChunkHeader) -> Result<Vec<u8>> {
     let data = bytes.get(chunk.data.clone()).unwrap_or_default();
-    let expected = chunk.decoded_bytes(header);
-    let stored_as_is = u64::try_from(data.len()).ok() == Some(expected);
-    if matches!(
-        header.compression,
-        exr::compression::Compression::DWAA(_) | exr::compression::Compression::DWAB(_)
-    ) && !stored_as_is
-    {
-        require_dwa_counts(data, chunk, header)?;
-    }
+    trusted::require(data, chunk, header)?;
     let corner = |position: u32| i32::try_from(position).unwrap_or(i32::MAX);
     let section = IntegerBounds {
         position: Vec2(corner(chunk.x), corner(chunk.y)),
@@ -160,35 +153,6 @@ fn decompress(bytes: &[u8], chunk: &Chunk, header: &Header, chunk_header: &Chunk
         .compression
         .decompress_image_section_from_le(chunk_header, data.to_vec(), section, true)
         .map_err(|e| refused(&e))
-}
-
-/// The counters at the start of a DWA chunk, by which the decompressor reserves memory.
-fn require_dwa_counts(data: &[u8], chunk: &Chunk, header: &Header) -> Result<()> {
-    let mut reader = Reader::new(data);
-    let mut counters = [0u64; 11];
-    for counter in &mut counters {
-        *counter = reader.u64_le()?;
-    }
-    let [_, unknown, _, _, _, _, run_lengths, raw, ac, dc, _] = counters;
-    let bytes = chunk.decoded_bytes(header);
-    let channels = u64::try_from(header.channels.stored.len()).unwrap_or(u64::MAX);
-    let blocks = u64::from(chunk.width.div_ceil(8)).saturating_mul(u64::from(chunk.height.div_ceil(8)));
-    let blocks = blocks.saturating_mul(channels);
-    for (claimed, most) in [
-        (unknown, bytes),
-        (raw, bytes),
-        (run_lengths, bytes.saturating_mul(2)),
-        (dc, blocks),
-        (ac, blocks.saturating_mul(63)),
-    ] {
-        if claimed > most {
-            return Err(Error::malformed(
-                format!("a counter of {claimed} in a DWA chunk"),
-                format!("at most {most}"),
-            ));
-        }
-    }
-    Ok(())
 }
 
 fn refused(error: &exr::error::Error) -> Error {

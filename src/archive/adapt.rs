@@ -178,6 +178,10 @@ impl Source for Adapted {
         Ok(samples)
     }
 
+    fn notes(&self) -> Vec<String> {
+        self.inner.notes()
+    }
+
     fn check(&self, context: &Context<'_>) -> Result<String> {
         self.inner.check(context)
     }

@@ -8,20 +8,16 @@ use btfkit_formats::utia::Order;
 use btfkit_formats::{
     Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
 };
-use sha2::{Digest, Sha256};
 
 use super::adapt::Type;
-use super::{HEAD_BYTES, Options, Source, files, read_beside};
+use super::{HEAD_BYTES, Options, Source, digest_of, files, read_beside};
 use crate::error::{Error, Result};
-use crate::run::{Context, recipe};
+use crate::run::Context;
 use crate::store::mapped::MappedFile;
 
 /// Groups that the lights of a view are read in: enough for some threads, few enough that what a group has
 /// in common (a block of factors, say) is worked out seldom.
 const GROUPS: usize = 8;
-
-/// Bytes of the file that are looked at at a time.
-const DIGEST_STEP: usize = 8 << 20;
 
 /// The beginning of every `.npy` file.
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
@@ -63,10 +59,22 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
     } else if head.starts_with(NPY_MAGIC) {
         let beside = directions_beside(path, options, limits)?;
         Container::open(path, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
+    } else if crate::hdf5::recognise(&head) {
+        return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples }));
     } else {
         return Ok(None);
     };
     Ok(Some(Recognised { source: Box::new(opened?), samples }))
+}
+
+#[cfg(feature = "hdf5")]
+fn open_hdf5(path: &Path, limits: &Limits) -> Result<Box<dyn Source>> {
+    Ok(Box::new(super::hdf5::Hdf5::open(path, limits)?))
+}
+
+#[cfg(not(feature = "hdf5"))]
+fn open_hdf5(path: &Path, _: &Limits) -> Result<Box<dyn Source>> {
+    Err(crate::hdf5::not_built_in(path))
 }
 
 /// The order of images that the user names for a BIG or MIF file.
@@ -161,14 +169,6 @@ impl Source for Container {
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
-        let mut digest = Sha256::new();
-        let length = self.file.as_ref().len();
-        for start in (0..length).step_by(DIGEST_STEP) {
-            context.check_stop()?;
-            let range = start..(start + DIGEST_STEP).min(length);
-            digest.update(&self.file.as_ref()[range.clone()]);
-            self.file.release(range);
-        }
-        Ok(recipe::hexadecimal(&digest.finalize()))
+        digest_of(&self.path, context)
     }
 }

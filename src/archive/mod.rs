@@ -7,22 +7,29 @@ pub mod adapt;
 mod catalogue;
 mod container;
 mod files;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 mod pictures;
 pub mod views;
 
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
+use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
-use crate::run::Context;
+use crate::run::{Context, recipe};
 use adapt::Adaptation;
 
 /// Bytes that tell one container from another.
 const HEAD_BYTES: u64 = 4096;
+
+/// Bytes of a file that are digested at a time.
+const DIGEST_STEP_BYTES: usize = 4 << 20;
 
 /// A measurement that can be read image by image.
 pub trait Source: Send + Sync {
@@ -37,6 +44,11 @@ pub trait Source: Send + Sync {
 
     /// The images of one view under a range of lights, [light, y, x, channel].
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples>;
+
+    /// What a user should know of the archive that its samples do not depend on, a sentence each.
+    fn notes(&self) -> Vec<String> {
+        Vec::new()
+    }
 
     /// Looks at the whole archive without decoding it, and returns a digest of everything that its samples
     /// depend on.
@@ -88,4 +100,19 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
 /// The bytes of a small file beside an archive.
 fn read_beside(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).map_err(|error| Error::io("read", path, error))
+}
+
+/// SHA-256 of a file's bytes.
+fn digest_of(path: &Path, context: &Context<'_>) -> Result<String> {
+    let failed = |error| Error::io("read", path, error);
+    let mut file = std::fs::File::open(path).map_err(failed)?;
+    let mut digest = Sha256::new();
+    let mut piece = vec![0; DIGEST_STEP_BYTES];
+    loop {
+        context.check_stop()?;
+        match file.read(&mut piece).map_err(failed)? {
+            0 => return Ok(recipe::hexadecimal(&digest.finalize())),
+            length => digest.update(&piece[..length]),
+        }
+    }
 }

@@ -22,6 +22,8 @@ pub(super) struct Pictures {
     files: Files,
     /// File of each image, [view, light].
     images: Vec<usize>,
+    /// Files that are no images.
+    ignored: usize,
     contents: Contents,
     decoding: DecodeOptions,
     limits: Limits,
@@ -58,10 +60,10 @@ impl Pictures {
             linear: header.linear,
             cosine_included: true,
             assumptions,
-            remarks: vec![("other files".to_owned(), catalogue.ignored().to_string())],
+            remarks: Vec::new(),
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
-        Ok(Self { path, files, images, contents, decoding, limits })
+        Ok(Self { path, files, images, ignored: catalogue.ignored(), contents, decoding, limits })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -115,6 +117,13 @@ impl Source for Pictures {
 
     fn lights_at_once(&self) -> usize {
         1
+    }
+
+    fn notes(&self) -> Vec<String> {
+        match self.ignored {
+            0 => Vec::new(),
+            count => vec![format!("{count} other files are ignored")],
+        }
     }
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {

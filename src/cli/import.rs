@@ -24,7 +24,7 @@ Examples:
   btf import wall.btf --codec predictive          half the size of the default; zarr-python needs our module to read it
 Interrupted, the same command goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives; the last name is the store to make if it ends in .zarr
+    /// Archives; the last name is the store to make if it ends in .zarr or does not exist yet
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
     /// Folder for the stores of several archives [default: here]
@@ -73,7 +73,9 @@ impl Import {
     }
 
     fn jobs(&self) -> Result<Vec<Job>> {
-        let is_store = |path: &Path| path.extension().is_some_and(|e| e == "zarr");
+        let is_store = |path: &Path| {
+            path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists() || !path.exists()
+        };
         let folder = self.into.clone().unwrap_or_default();
         match self.paths.split_last() {
             Some((store, pieces)) if is_store(store) && !pieces.is_empty() => {

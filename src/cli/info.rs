@@ -89,6 +89,7 @@ impl Info {
             rows.push(row![format!("store, about ({})", codec.name()), bytes_text(bytes)]);
         }
         rows.extend(contents.remarks.iter().map(|(name, value)| row![name, value]));
+        rows.extend(source.notes().iter().map(|note| row!["note", note]));
         rows.extend(contents.assumptions.iter().map(|assumption| row!["assumed", assumption]));
         Ok(rows)
     }

@@ -190,7 +190,7 @@ fn floats_go_through_the_whole_method() {
     let folder = tempfile::tempdir().unwrap();
     let archive = fixture().archive();
     let [store, model, big] = ["f.zarr", "f.model.zarr", "f.big.zarr"].map(|name| folder.path().join(name));
-    import(&[&archive], &store, &["--samples", "f16"]);
+    import(&[&archive], &store, &["--samples", "f32"]);
     succeed(btf().arg("model").args([&store, &model]).args(["--clusters", "24"]));
     succeed(btf().arg("enlarge").args([&model, &big]).args(["--size", "64x64"]));
     succeed(
@@ -203,7 +203,7 @@ fn floats_go_through_the_whole_method() {
     succeed(btf().arg("compare").args([&model, &store]));
     // The same codes, so the same clusters as the 8-bit samples.
     let index = |model: &Path| tree(&model.join("index"));
-    assert_eq!(index(&model), index(&fixture().model()));
+    assert!(index(&model) == index(&fixture().model()));
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn a_truncated_zip_and_a_file_that_is_none_are_refused() {
 #[test]
 fn a_target_that_cannot_be_written_is_an_io_error() {
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("file");
+    let file = folder.path().join("file.zarr");
     std::fs::write(&file, "in the way").unwrap();
     let below = file.join("store.zarr");
     fail(btf().arg("import").args([&fixture().archive(), &below]), 74);
@@ -209,7 +209,7 @@ fn no_flipped_bit_of_a_store_brings_the_reader_down() {
     let (archive, store) = (folder.path().join("s.zip"), folder.path().join("s.zarr"));
     succeed(btf().arg("sample").arg(&archive).args(["--size", "16x16", "--views", "3", "--lights", "4"]));
     succeed(btf().arg("import").args([&archive, &store]));
-    let read = || -> btfkit::Result<(Vec<u8>, Vec<u8>)> {
+    let read = || -> btfkit::Result<(btfkit_formats::Samples, Vec<u8>)> {
         let measurement = Measurement::open(&store)?;
         let window = measurement.description().size.window();
         Ok((measurement.read_reflectance(1, window)?, measurement.read_luminance(1, window)?))

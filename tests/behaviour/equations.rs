@@ -70,21 +70,15 @@ fn a_rendered_height_field_gives_back_its_normals() {
     let points = scene.view(0, [0.0, 0.0]);
     let images: Vec<Vec<u8>> = (0..lights.len()).map(|light| points.image(light).unwrap()).collect();
     let stereo = Stereo::new(&lights).unwrap();
-    let linear = btfkit::color::Transfer::Srgb.table();
+    let curve = btfkit::color::Transfer::Srgb;
     let degrees = |a: [f32; 3], b: [f32; 3]| {
         let cosine: f32 = a.iter().zip(b).map(|(a, b)| a * b).sum();
         f64::from(cosine.clamp(-1.0, 1.0)).acos().to_degrees()
     };
     let (mut error, mut flat) = (0.0, 0.0);
     for (texel, &normal) in truth.iter().enumerate() {
-        let intensities: Vec<f64> = images
-            .iter()
-            .map(|image| {
-                let rgb: Vec<f64> =
-                    image[texel * 3..texel * 3 + 3].iter().map(|&s| linear[usize::from(s)]).collect();
-                btfkit::color::luminance(&rgb)
-            })
-            .collect();
+        let intensities: Vec<f64> =
+            images.iter().map(|image| luminance(&image[texel * 3..texel * 3 + 3], curve)).collect();
         error += degrees(stereo.normal(&intensities), normal);
         flat += degrees([0.0, 0.0, 1.0], normal);
     }
@@ -95,23 +89,32 @@ fn a_rendered_height_field_gives_back_its_normals() {
 /// Every sample of the store is the decoded image's at its place, every code that of its colour.
 #[test]
 fn the_store_holds_the_decoded_images() {
-    use btfkit::archive::Archive;
-    let archive = Archive::open(&fixture().archive()).unwrap();
+    let bytes = std::fs::read(fixture().archive()).unwrap();
+    let limits = btfkit_formats::Limits::default();
+    let index = btfkit_formats::zip::ZipIndex::open(&bytes, &limits).unwrap();
+    let names = index.entries().iter().map(|entry| entry.name());
+    let catalogue = btfkit_formats::Catalogue::from_names(names).unwrap();
     let measurement = btfkit::store::measurement::Measurement::open(&fixture().measurement()).unwrap();
     let description = measurement.description();
-    let linear = description.transfer.table();
     for view in 0..description.views.len() {
         let samples = measurement.read_reflectance(view, description.size.window()).unwrap();
+        let btfkit_formats::Samples::U8(samples) = samples else { panic!("not 8-bit") };
         let codes = measurement.read_luminance(view, description.size.window()).unwrap();
         for light in 0..description.lights.len() {
-            let bytes = archive.image_bytes(view, light).unwrap();
-            let image = btfkit_formats::jpeg::decode(&bytes, archive.limits()).unwrap();
+            let entry = index.read(&bytes, catalogue.image(view, light).unwrap()).unwrap();
+            let image = btfkit_formats::jpeg::decode(&entry, &limits).unwrap();
             for (texel, sample) in image.samples.chunks_exact(3).enumerate() {
                 let at = texel * description.lights.len() + light;
                 assert_eq!(&samples[at * 3..at * 3 + 3], sample, "view {view}, light {light}, texel {texel}");
-                let rgb: Vec<f64> = sample.iter().map(|&s| linear[usize::from(s)]).collect();
-                assert_eq!(codes[at], btfkit::color::lightness_code(btfkit::color::luminance(&rgb)));
+                let y = luminance(sample, description.transfer);
+                assert_eq!(codes[at], btfkit::color::lightness_code(y));
             }
         }
     }
+}
+
+/// Luminance of an 8-bit colour.
+fn luminance(sample: &[u8], curve: btfkit::color::Transfer) -> f64 {
+    let linear = sample.iter().map(|&s| curve.decode(f64::from(s) / 255.0));
+    linear.zip(btfkit::color::LUMINANCE_WEIGHTS).map(|(value, weight)| weight * value).sum()
 }

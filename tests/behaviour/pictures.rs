@@ -6,6 +6,7 @@ use btfkit::color::Transfer;
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
+use btfkit_formats::Samples;
 
 use crate::fixture::{btf, fixture, succeed};
 
@@ -33,6 +34,7 @@ fn the_measurement_shows_its_samples() {
     let measurement = Measurement::open(&fixture().measurement()).unwrap();
     let lights = measurement.description().lights.len();
     let stored = measurement.read_reflectance(4, measurement.description().size.window()).unwrap();
+    let Samples::U8(stored) = stored else { panic!("not 8-bit") };
     let expected: Vec<u8> =
         stored.chunks_exact(lights * 3).flat_map(|texel| &texel[33..36]).copied().collect();
     assert_eq!(pixels(&fixture().measurement(), 4, 11), expected);
@@ -44,9 +46,10 @@ fn tile_and_enlarged_index_show_the_samples_of_the_representatives() {
     let representatives = model.representatives().unwrap();
     let [_, views, lights, channels] = representatives.shape;
     assert_eq!(representatives.transfer, Transfer::Srgb);
+    let Samples::U8(samples) = &representatives.samples else { panic!("not 8-bit") };
     let sample = |cluster: &u16| {
         let at = ((usize::from(*cluster) * views + 7) * lights + 2) * channels;
-        &representatives.samples[at..at + channels]
+        &samples[at..at + channels]
     };
     let expected: Vec<u8> = model.index().unwrap().iter().flat_map(sample).copied().collect();
     assert_eq!(pixels(&fixture().model(), 7, 2), expected);

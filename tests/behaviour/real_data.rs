@@ -28,6 +28,7 @@ fn original_photographs_are_imported_and_have_upright_normals() {
     assert_eq!((measurement.description().views.len(), measurement.description().lights.len()), (1, 81));
     // Means of the 8-bit values by light elevation, as found by another decoder.
     let samples = measurement.read_reflectance(0, measurement.description().size.window()).unwrap();
+    let btfkit_formats::Samples::U8(samples) = samples else { panic!("not 8-bit") };
     for (light, expected) in [(0, 150.0), (60, 52.0)] {
         let values = samples.chunks_exact(3).skip(light).step_by(81).flatten().map(|&s| f64::from(s));
         let mean = values.sum::<f64>() / (256.0 * 256.0 * 3.0);

@@ -49,9 +49,9 @@ impl Archive {
             let (images, contents) = ImageList::open(&file, limits)?;
             (Layout::Images(images), contents)
         } else {
-            return Err(file.error(format!("got {}, expected reflectance or ground_color", file.names())).hint(
-                "of HDF5 files, NeuralBTF's lists of images and what this program writes are read",
-            ));
+            return Err(file
+                .error(format!("got {}, expected reflectance or ground_color", file.names()))
+                .hint("of HDF5 files, NeuralBTF's lists of images and what this program writes are read"));
         };
         let pixels = u64::from(contents.width) * u64::from(contents.height);
         if pixels > limits.max_pixels_per_image {

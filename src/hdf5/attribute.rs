@@ -3,7 +3,7 @@
 //! Text of variable length is not read. It lies in a heap of its own, and where a flipped bit makes the length in the
 //! attribute smaller than that in the heap, older C libraries write past the end of their buffer.
 
-use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
+use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii};
 use hdf5::{Attribute, Location};
 use serde_json::Value;
 
@@ -82,7 +82,9 @@ impl<'a> Attributes<'a> {
         let fail = |error: hdf5::Error| self.error(name, error);
         let shape = attribute.space().map_err(fail)?.shape();
         if shape.len() != 1 || shape.iter().any(|&n| n > MAX_NAMES) {
-            return Err(self.error(name, format!("got the shape {shape:?}, expected up to {MAX_NAMES} names")));
+            return Err(
+                self.error(name, format!("got the shape {shape:?}, expected up to {MAX_NAMES} names"))
+            );
         }
         let texts: Vec<Vec<u8>> = match kind {
             TypeDescriptor::FixedUnicode(n) if n <= MAX_NAME_BYTES => {
@@ -121,7 +123,10 @@ pub(super) fn write(location: &Location, name: &str, value: &Value) -> std::resu
 
 fn write_text(location: &Location, name: &str, text: &str) -> std::result::Result<(), hdf5::Error> {
     let held: FixedUnicode<MAX_TEXT_BYTES> = text.parse().map_err(|_| {
-        hdf5::Error::from(format!("attribute {name} has {} bytes, expected at most {MAX_TEXT_BYTES}", text.len()))
+        hdf5::Error::from(format!(
+            "attribute {name} has {} bytes, expected at most {MAX_TEXT_BYTES}",
+            text.len()
+        ))
     })?;
     let kind = TypeDescriptor::FixedUnicode(text.len().max(1));
     location.new_attr_builder().empty_as(&kind).create(name)?.write_scalar(&held)
@@ -141,4 +146,13 @@ pub(super) fn write_texts(
     let longest = texts.iter().map(|text| text.as_ref().len()).max().unwrap_or(0).max(1);
     let kind = TypeDescriptor::FixedUnicode(longest);
     location.new_attr_builder().empty_as(&kind).shape(texts.len()).create(name)?.write_raw(&held[..])
+}
+
+/// Names the dimensions of a dataset. HDF5's dimension scales want these texts to be of variable length, and other
+/// readers fall over others; they are not read here.
+pub(super) fn write_labels(location: &Location, names: &[&str]) -> std::result::Result<(), hdf5::Error> {
+    let names: std::result::Result<Vec<VarLenAscii>, _> =
+        names.iter().map(|name| VarLenAscii::from_ascii(name)).collect();
+    let names = names.map_err(|error| hdf5::Error::from(error.to_string()))?;
+    location.new_attr::<VarLenAscii>().shape(names.len()).create("DIMENSION_LABELS")?.write_raw(&names[..])
 }

@@ -80,11 +80,12 @@ impl File {
     pub(super) fn table(&self, name: &'static str, limits: &Limits) -> Result<Table> {
         let wrong = |what: String| self.error(format!("{name}: {what}"));
         let link = self.links.iter().find(|(known, _)| known == name);
-        let &(_, link) = link.ok_or_else(|| {
-            self.error(format!("no dataset {name}, got {}", self.names()))
-        })?;
+        let &(_, link) =
+            link.ok_or_else(|| self.error(format!("no dataset {name}, got {}", self.names())))?;
         if link != LinkType::Hard {
-            return Err(wrong("a link to another name or another file, expected the data in this file".to_owned()));
+            return Err(wrong(
+                "a link to another name or another file, expected the data in this file".to_owned(),
+            ));
         }
         let library = |error: hdf5::Error| wrong(error.to_string());
         if self.file.loc_type_by_name(name).map_err(library)? != LocationType::Dataset {
@@ -99,7 +100,7 @@ impl File {
         let filters = properties.get_filters().map_err(library)?;
         if let Some(filter) = filters.iter().find_map(foreign_filter) {
             return Err(wrong(format!("packed by {filter}, expected deflate, shuffle and fletcher32 only"))
-                .hint("unpack it first: h5repack -f GZIP=1 IN OUT"));
+                .hint("write the dataset anew without it, or with gzip"));
         }
         let table = Table {
             kind: dataset.dtype().and_then(|kind| kind.to_descriptor()).map_err(library)?,
@@ -110,9 +111,9 @@ impl File {
         };
         let elements = table.shape.iter().try_fold(1u64, |n, &extent| n.checked_mul(extent as u64));
         let bytes = elements.and_then(|n| n.checked_mul(table.kind.size() as u64));
-        let bytes = bytes
-            .filter(|&bytes| bytes > 0)
-            .ok_or_else(|| wrong(format!("got the shape {:?}, expected one that can be held", table.shape)))?;
+        let bytes = bytes.filter(|&bytes| bytes > 0).ok_or_else(|| {
+            wrong(format!("got the shape {:?}, expected one that can be held", table.shape))
+        })?;
         match properties.get_layout().map_err(library)? {
             Layout::Compact => table.expect_stored(bytes, self.bytes)?,
             Layout::Contiguous => {
@@ -136,8 +137,9 @@ impl File {
 
 /// What the C library says about a file as a whole.
 fn refused(path: &Path, error: &hdf5::Error) -> Error {
-    Error::input(format!("{}: {error}", path.display()))
-        .hint("expected an HDF5 file that is whole; where files cannot be locked, set HDF5_USE_FILE_LOCKING=FALSE")
+    Error::input(format!("{}: {error}", path.display())).hint(
+        "expected an HDF5 file that is whole; where files cannot be locked, set HDF5_USE_FILE_LOCKING=FALSE",
+    )
 }
 
 /// A filter that is not undone here, by its registered name.
@@ -264,9 +266,13 @@ impl Table {
         if count > file_bytes {
             return Err(wrong(format!("got {count} chunks in a file of {file_bytes} bytes")));
         }
-        let found = self.dataset.num_chunks().ok_or_else(|| wrong("its chunks cannot be counted".to_owned()))?;
+        let found =
+            self.dataset.num_chunks().ok_or_else(|| wrong("its chunks cannot be counted".to_owned()))?;
         if found as u64 != count {
-            return Err(wrong(format!("got {found} chunks, expected {count} for the shape {:?}", self.shape)));
+            return Err(wrong(format!(
+                "got {found} chunks, expected {count} for the shape {:?}",
+                self.shape
+            )));
         }
         let stored = self.dataset.storage_size();
         let honest = count.saturating_mul(chunk_bytes + chunk_bytes / 100 + CHUNK_OVERHEAD_BYTES);

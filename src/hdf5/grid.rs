@@ -60,8 +60,9 @@ fn distinct(what: &str, list: &[[f64; 2]], limits: &Limits) -> Result<(Vec<Direc
     let mut numbers = Vec::with_capacity(list.len());
     let mut directions = Vec::new();
     for (image, &xy) in list.iter().enumerate() {
-        let direction = of_unit_vector(xy)
-            .ok_or_else(|| format!("image {image}: got {xy:?}, expected x and y of a unit vector to the {what}"))?;
+        let direction = of_unit_vector(xy).ok_or_else(|| {
+            format!("image {image}: got {xy:?}, expected x and y of a unit vector to the {what}")
+        })?;
         let square = xy.map(|c| (c / TOLERANCE).floor() as i64);
         let near = |&&known: &&usize| (0..2).all(|k| (found[known][k] - xy[k]).abs() <= TOLERANCE);
         let beside = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [square[0] + dx, square[1] + dy]));

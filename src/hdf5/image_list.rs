@@ -82,9 +82,7 @@ impl ImageList {
 fn read_directions(file: &File, name: &'static str, count: usize, limits: &Limits) -> Result<Vec<[f64; 2]>> {
     let table = file.table(name, limits)?;
     match *table.shape() {
-        [n, 2] if n == count => {
-            Ok(table.read_floats()?.chunks_exact(2).map(|xy| [xy[0], xy[1]]).collect())
-        }
+        [n, 2] if n == count => Ok(table.read_floats()?.chunks_exact(2).map(|xy| [xy[0], xy[1]]).collect()),
         [_, _, _, ..] => Err(near_field(&table)),
         _ => Err(table.error(format!("got the shape {:?}, expected [{count}, 2]", table.shape()))),
     }

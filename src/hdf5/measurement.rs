@@ -47,12 +47,13 @@ impl Texels {
                 return Err(wrong(name, &found, expected.to_string()));
             }
         }
-        let either = |name: &str, known: [(bool, &str); 2]| -> Result<bool> {
-            let found = root.text(name)?;
-            known.iter().find(|(_, text)| *text == found).map(|&(is, _)| is).ok_or_else(|| {
-                wrong(name, &found.into(), format!("{:?} or {:?}", known[0].1, known[1].1))
-            })
-        };
+        let either =
+            |name: &str, known: [(bool, &str); 2]| -> Result<bool> {
+                let found = root.text(name)?;
+                known.iter().find(|(_, text)| *text == found).map(|&(is, _)| is).ok_or_else(|| {
+                    wrong(name, &found.into(), format!("{:?} or {:?}", known[0].1, known[1].1))
+                })
+            };
         let reflectance = file.table(REFLECTANCE, limits)?;
         let [views, height, width, lights, channels] = reflectance.extents([
             ("view", limits.max_directions),
@@ -61,8 +62,9 @@ impl Texels {
             ("light", limits.max_directions),
             ("channel", limits.max_channels),
         ])?;
-        let names = Attributes::of(reflectance.location(), format!("{}: {REFLECTANCE}", file.path().display()))
-            .texts("channels")?;
+        let names =
+            Attributes::of(reflectance.location(), format!("{}: {REFLECTANCE}", file.path().display()))
+                .texts("channels")?;
         if names.len() != channels {
             return Err(reflectance.error(format!("got {channels} channels and the names {names:?}")));
         }

@@ -120,7 +120,7 @@ impl Writer {
         let builder = file.new_dataset::<T>().shape(shape.to_vec()).chunk(chunk);
         let dataset = builder.shuffle().deflate(DEFLATE_LEVEL).fletcher32().create(name)?;
         let names = ["view", "y", "x", "light", "channel"];
-        attribute::write_texts(&dataset, "DIMENSION_LABELS", &names[..shape.len()])?;
+        attribute::write_labels(&dataset, &names[..shape.len()])?;
         Ok(dataset)
     }
 
@@ -132,7 +132,8 @@ impl Writer {
         let [_, height, width, lights, channels] = self.shape;
         if let Some(codes) = luminance {
             if self.luminance.is_none() {
-                self.luminance = Some(self.begin_luminance().map_err(|error| cannot_write(&self.path, &error))?);
+                self.luminance =
+                    Some(self.begin_luminance().map_err(|error| cannot_write(&self.path, &error))?);
             }
             self.write(1, view, codes, &[height, width, lights])?;
         }
@@ -211,11 +212,12 @@ fn write_directions(file: &File, which: usize, directions: &[Direction]) -> hdf5
     let angles: Vec<f64> = directions.iter().flat_map(|d| [d.theta_rad, d.phi_rad]).collect();
     let shape = [directions.len(), 2];
     // In a chunk, for the sake of a checksum.
-    let dataset = file.new_dataset::<f64>().shape(shape).chunk(shape).fletcher32().create(DIRECTIONS[which])?;
+    let dataset =
+        file.new_dataset::<f64>().shape(shape).chunk(shape).fletcher32().create(DIRECTIONS[which])?;
     dataset.write(ArrayView2::from_shape((directions.len(), 2), &angles)?)?;
     attribute::write(&dataset, "units", &"rad".into())?;
     attribute::write_texts(&dataset, "angles", &["theta", "phi"])?;
-    attribute::write_texts(&dataset, "DIMENSION_LABELS", &[["view", "light"][which], "angle"])
+    attribute::write_labels(&dataset, &[["view", "light"][which], "angle"])
 }
 
 fn cannot_write(path: &Path, error: &hdf5::Error) -> Error {

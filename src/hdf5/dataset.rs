@@ -119,7 +119,7 @@ impl File {
             Layout::Contiguous => {
                 table.expect_stored(bytes, self.bytes)?;
                 let end = table.dataset.offset().and_then(|start| start.checked_add(bytes));
-                if !end.is_some_and(|end| end <= self.bytes) {
+                if end.is_none_or(|end| end > self.bytes) {
                     return Err(wrong(format!("{bytes} bytes of data reach beyond the file")));
                 }
             }

@@ -40,8 +40,8 @@ impl Writer {
     /// Remarks and assumptions of `contents` are not written.
     ///
     /// # Errors
-    /// [`crate::Kind::Io`] where nothing can be written; [`crate::Kind::Usage`] for contents without views, lights, channels or texels, or an
-    /// attribute of more than 60 000 bytes.
+    /// [`crate::Kind::Usage`] for contents without views, lights, channels or texels; [`crate::Kind::Io`] where nothing can
+    /// be written, or for an attribute of more than 60 000 bytes.
     pub fn create(path: &Path, contents: &Contents, attributes: &Map<String, Value>) -> Result<Self> {
         let shape = [
             contents.views.len(),

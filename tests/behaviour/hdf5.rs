@@ -129,6 +129,22 @@ fn what_is_written_is_read_back_for_every_type() {
 }
 
 #[test]
+fn one_archive_serves_several_threads() {
+    let _files = FILES.read();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.h5");
+    let contents = contents(SIZE, 6, 3, &["Y"], SampleType::U16);
+    write(&path, &contents, false);
+    let archive = open(&path).unwrap();
+    std::thread::scope(|scope| {
+        for view in 0..6 {
+            let (archive, truth) = (&archive, view_samples(&contents, view));
+            scope.spawn(move || assert_eq!(archive.read_view(view, SIZE.window()).unwrap(), truth));
+        }
+    });
+}
+
+#[test]
 fn what_there_is_none_of_is_an_error_and_not_a_panic() {
     let _files = FILES.read();
     let folder = tempfile::tempdir().unwrap();
@@ -311,6 +327,20 @@ fn attributes_that_do_not_fit_are_refused() {
         directions.write(&Array2::from_elem((3, 2), 2.0f64)).unwrap();
     });
     assert!(told.contains("light_direction: got theta 2"), "{told}");
+}
+
+#[test]
+fn an_attribute_of_another_program_is_no_obstacle() {
+    let _files = FILES.read();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.h5");
+    let file = small(&path);
+    let note: VarLenUnicode = "seen".parse().unwrap();
+    file.new_attr::<VarLenUnicode>().create("note").unwrap().write_scalar(&note).unwrap();
+    drop(file);
+    let names: Vec<String> =
+        open(&path).unwrap().contents().remarks.iter().map(|(name, _)| name.clone()).collect();
+    assert_eq!(names, ["recipe", "version", "white"]);
 }
 
 #[test]

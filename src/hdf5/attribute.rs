@@ -1,7 +1,7 @@
 //! Attributes: text of fixed length, and numbers.
 //!
-//! Text of variable length is not read. It lies in a heap of its own, and where a flipped bit makes the length in the
-//! attribute smaller than that in the heap, older C libraries write past the end of their buffer.
+//! Text of variable length is not read: it lies in a heap that bears no checksum, with a length there and another in the
+//! attribute, and what the C library does where they disagree is not to be relied on.
 
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii};
 use hdf5::{Attribute, Location};

@@ -29,7 +29,7 @@ const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// Where a superblock may begin, after a block of the user's own: 0, or 512 times a power of two.
 fn superblock_places() -> impl Iterator<Item = usize> {
-    std::iter::once(0).chain((9..40).map(|power| 1 << power))
+    std::iter::once(0).chain((9..usize::BITS).map(|power| 1 << power))
 }
 
 /// Whether a file that begins with these bytes (or has all of them) is HDF5.

@@ -1,9 +1,9 @@
 //! Attributes: text of fixed length, and numbers.
 //!
-//! Text of variable length is not read. It lies in a heap of its own, and where a flipped bit makes the length in the
-//! attribute smaller than that in the heap, older C libraries write past the end of their buffer.
+//! Text of variable length is not read: it lies in a heap that bears no checksum, with a length there and another in the
+//! attribute, and what the C library does where they disagree is not to be relied on.
 
-use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
+use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor, VarLenAscii};
 use hdf5::{Attribute, Location};
 use serde_json::Value;
 
@@ -42,20 +42,25 @@ impl<'a> Attributes<'a> {
 
     /// Names of all attributes.
     pub(super) fn names(&self) -> Result<Vec<String>> {
-        self.location.attr_names().map_err(|error| self.error("list", error))
+        self.location
+            .attr_names()
+            .map_err(|error| Error::input(format!("{}: attributes: {error}", self.place)))
     }
 
-    /// A number or a text.
-    pub(super) fn value(&self, name: &str) -> Result<Value> {
+    /// A number or a text; nothing where it is of a type that is not read.
+    pub(super) fn value(&self, name: &str) -> Result<Option<Value>> {
         let (attribute, kind) = self.open(name)?;
-        let fail = |error: hdf5::Error| self.error(name, error);
-        match kind {
+        let value = match kind {
             TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) => {
-                attribute.read_scalar::<i64>().map(Value::from).map_err(fail)
+                attribute.read_scalar::<i64>().map(Value::from)
             }
-            TypeDescriptor::Float(_) => attribute.read_scalar::<f64>().map(Value::from).map_err(fail),
-            _ => self.text(name).map(Value::from),
-        }
+            TypeDescriptor::Float(_) => attribute.read_scalar::<f64>().map(Value::from),
+            TypeDescriptor::FixedAscii(_) | TypeDescriptor::FixedUnicode(_) => {
+                return self.text(name).map(|text| Some(text.into()));
+            }
+            _ => return Ok(None),
+        };
+        value.map(Some).map_err(|error| self.error(name, error))
     }
 
     /// One text.
@@ -146,4 +151,12 @@ pub(super) fn write_texts(
     let longest = texts.iter().map(|text| text.as_ref().len()).max().unwrap_or(0).max(1);
     let kind = TypeDescriptor::FixedUnicode(longest);
     location.new_attr_builder().empty_as(&kind).shape(texts.len()).create(name)?.write_raw(&held[..])
+}
+
+/// Names the dimensions of a dataset. HDF5's dimension scales want these texts to be of variable length, and other
+/// readers fall over others; they are not read here.
+pub(super) fn write_labels(location: &Location, names: &[&str]) -> std::result::Result<(), hdf5::Error> {
+    let names: std::result::Result<Vec<VarLenAscii>, _> = names.iter().map(VarLenAscii::from_ascii).collect();
+    let names = names.map_err(|error| hdf5::Error::from(error.to_string()))?;
+    location.new_attr::<VarLenAscii>().shape(names.len()).create("DIMENSION_LABELS")?.write_raw(&names[..])
 }

@@ -100,7 +100,7 @@ impl File {
         let filters = properties.get_filters().map_err(library)?;
         if let Some(filter) = filters.iter().find_map(foreign_filter) {
             return Err(wrong(format!("packed by {filter}, expected deflate, shuffle and fletcher32 only"))
-                .hint("unpack it first: h5repack -f GZIP=1 IN OUT"));
+                .hint("write the dataset anew without it, or with gzip"));
         }
         let table = Table {
             kind: dataset.dtype().and_then(|kind| kind.to_descriptor()).map_err(library)?,
@@ -119,7 +119,7 @@ impl File {
             Layout::Contiguous => {
                 table.expect_stored(bytes, self.bytes)?;
                 let end = table.dataset.offset().and_then(|start| start.checked_add(bytes));
-                if !end.is_some_and(|end| end <= self.bytes) {
+                if end.is_none_or(|end| end > self.bytes) {
                     return Err(wrong(format!("{bytes} bytes of data reach beyond the file")));
                 }
             }

@@ -1,5 +1,6 @@
 //! From a list of images with directions of their own to every view under every light.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use btfkit_formats::{Direction, Limits};
@@ -81,8 +82,8 @@ fn distinct(what: &str, list: &[[f64; 2]], limits: &Limits) -> Result<(Vec<Direc
 }
 
 fn of_unit_vector([x, y]: [f64; 2]) -> Option<Direction> {
-    let across = x.hypot(y);
-    if !(across <= 1.0 + TOLERANCE) {
+    // NaN is none either.
+    if x.hypot(y).partial_cmp(&(1.0 + TOLERANCE)).is_none_or(Ordering::is_gt) {
         return None;
     }
     Direction::from_vector([x, y, (1.0 - x * x - y * y).max(0.0).sqrt()])

@@ -42,7 +42,7 @@ impl Texels {
             file.error(format!("attribute {name}: got {found}, expected {expected}"))
         };
         for (name, expected) in [("kind", Value::from(KIND)), ("format", Value::from(FORMAT))] {
-            let found = root.value(name)?;
+            let found = root.value(name)?.unwrap_or_default();
             if found != expected {
                 return Err(wrong(name, &found, expected.to_string()));
             }
@@ -69,9 +69,8 @@ impl Texels {
             return Err(reflectance.error(format!("got {channels} channels and the names {names:?}")));
         }
         let mut remarks = Vec::new();
-        for name in root.names()? {
-            if !TOLD.contains(&name.as_str()) {
-                let value = root.value(&name)?;
+        for name in root.names()?.into_iter().filter(|name| !TOLD.contains(&name.as_str())) {
+            if let Some(value) = root.value(&name)? {
                 remarks.push((name, value.as_str().map_or_else(|| value.to_string(), str::to_owned)));
             }
         }

@@ -40,8 +40,8 @@ impl Writer {
     /// Remarks and assumptions of `contents` are not written.
     ///
     /// # Errors
-    /// [`crate::Kind::Io`] where nothing can be written; [`crate::Kind::Usage`] for contents without views, lights, channels or texels, or an
-    /// attribute of more than 60 000 bytes.
+    /// [`crate::Kind::Usage`] for contents without views, lights, channels or texels; [`crate::Kind::Io`] where nothing can
+    /// be written, or for an attribute of more than 60 000 bytes.
     pub fn create(path: &Path, contents: &Contents, attributes: &Map<String, Value>) -> Result<Self> {
         let shape = [
             contents.views.len(),
@@ -120,7 +120,7 @@ impl Writer {
         let builder = file.new_dataset::<T>().shape(shape.to_vec()).chunk(chunk);
         let dataset = builder.shuffle().deflate(DEFLATE_LEVEL).fletcher32().create(name)?;
         let names = ["view", "y", "x", "light", "channel"];
-        attribute::write_texts(&dataset, "DIMENSION_LABELS", &names[..shape.len()])?;
+        attribute::write_labels(&dataset, &names[..shape.len()])?;
         Ok(dataset)
     }
 
@@ -217,7 +217,7 @@ fn write_directions(file: &File, which: usize, directions: &[Direction]) -> hdf5
     dataset.write(ArrayView2::from_shape((directions.len(), 2), &angles)?)?;
     attribute::write(&dataset, "units", &"rad".into())?;
     attribute::write_texts(&dataset, "angles", &["theta", "phi"])?;
-    attribute::write_texts(&dataset, "DIMENSION_LABELS", &[["view", "light"][which], "angle"])
+    attribute::write_labels(&dataset, &[["view", "light"][which], "angle"])
 }
 
 fn cannot_write(path: &Path, error: &hdf5::Error) -> Error {

@@ -505,38 +505,6 @@ fn flip_bits(path: &Path, step: usize) -> Flips {
     let mut flips = Flips::default();
     let mut next = 0;
     while next < bits {
-<<<<<<< HEAD
-        let started = FILES.write();
-        // No more memory than a reader of a small file can need.
-        let mut child = Command::new("sh")
-            .args(["-c", "ulimit -v 4000000; ulimit -c 0; exec \"$0\" --exact hdf5::harmed --ignored"])
-            .arg(std::env::current_exe().unwrap())
-            .env(HARMED, format!("{}|{next}|{step}", path.display()))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        drop(started);
-        let log = path.with_extension("log");
-        let reached =
-            || std::fs::read_to_string(&log).unwrap_or_default().get(..12).map(|at| at.trim().to_owned());
-        let (mut at, mut since) = (None, Instant::now());
-        let status = loop {
-            if let Some(status) = child.try_wait().unwrap() {
-                break status;
-            }
-            std::thread::sleep(Duration::from_millis(20));
-            if reached() != at {
-                (at, since) = (reached(), Instant::now());
-            } else if since.elapsed() > Duration::from_secs(20) {
-                child.kill().unwrap();
-            }
-        };
-        for outcome in std::fs::read(&log).unwrap().get(16..).unwrap_or_default() {
-            if let Some(count) = outcome.checked_sub(b'0').and_then(|n| outcomes.get_mut(usize::from(n))) {
-                *count += 1;
-            }
-=======
         let status = wait(&mut start_reader(path, next, step), &log);
         let log = std::fs::read(&log).unwrap();
         let count = |outcome| log.iter().skip(16).filter(|&&o| o == outcome).count();
@@ -546,7 +514,6 @@ fn flip_bits(path: &Path, step: usize) -> Flips {
         let reached = String::from_utf8_lossy(&log[..12]).trim().to_owned();
         if reached == "done" {
             break;
->>>>>>> hdf5
         }
         let bit = reached.parse().unwrap();
         flips.ended.push((bit, status));

@@ -5,12 +5,13 @@
 
 use btfkit::color::{LightnessCodes, Transfer};
 use btfkit::kernel::absolute_difference::Kernel;
+use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
+use btfkit::texel::direction::Direction;
 use btfkit::texel::nearest::{NearestNormals, Neighbour};
-use btfkit_formats::Direction;
-use divan::counter::ItemsCount;
+use divan::counter::{BytesCount, ItemsCount};
 use divan::{Bencher, black_box};
 
 fn main() {
@@ -59,6 +60,51 @@ fn distances(bencher: Bencher<'_, '_>, kernel: Kernel) {
             arrangement.groups(),
             black_box(&mut found),
         );
+    });
+}
+
+const CHUNK: Shape = Shape { rows: 16, columns: 16, lights: 81 };
+
+/// A chunk of 8-bit colours: a ramp with noise.
+fn colours() -> Vec<u8> {
+    let noise = bytes(CHUNK.samples() * 3, 3);
+    let ramp = |n: usize| (n / 243 % 16 * 3 + n / 3888 * 2 + n % 243 / 3) as u8;
+    noise.iter().enumerate().map(|(n, noise)| ramp(n).wrapping_add(noise % 8)).collect()
+}
+
+/// Residuals of a chunk, the choice of the modes included.
+#[divan::bench(args = predict::Kernel::available())]
+fn prediction(bencher: Bencher<'_, '_>, kernel: predict::Kernel) {
+    let samples = colours();
+    let mut predictor = Predictor::<u8>::new(kernel, CHUNK, 3, Numbers::Integer);
+    let (mut residuals, mut modes) = (vec![0; samples.len()], Vec::new());
+    bencher.counter(BytesCount::new(samples.len())).bench_local(|| {
+        predictor.forward(black_box(&samples), black_box(&mut residuals), &mut modes);
+    });
+}
+
+/// The samples of a chunk from its residuals.
+#[divan::bench(args = predict::Kernel::available())]
+fn prediction_undone(bencher: Bencher<'_, '_>, kernel: predict::Kernel) {
+    let samples = colours();
+    let mut predictor = Predictor::<u8>::new(kernel, CHUNK, 3, Numbers::Integer);
+    let (mut residuals, mut modes) = (vec![0; samples.len()], Vec::new());
+    predictor.forward(&samples, &mut residuals, &mut modes);
+    let mut back = vec![0; samples.len()];
+    bencher.counter(BytesCount::new(samples.len())).bench_local(|| {
+        predictor.inverse(black_box(&residuals), &modes, black_box(&mut back));
+    });
+}
+
+/// The differences of a chunk that stock readers undo, and back.
+#[divan::bench(args = predict::Kernel::available())]
+fn deltas(bencher: Bencher<'_, '_>, kernel: predict::Kernel) {
+    let samples = colours();
+    let mut deltas = Deltas::<u8>::new(kernel, CHUNK, 3);
+    let (mut bytes, mut back) = (vec![0; samples.len()], vec![0; samples.len()]);
+    bencher.counter(BytesCount::new(2 * samples.len())).bench_local(|| {
+        deltas.forward(black_box(&samples), black_box(&mut bytes));
+        deltas.inverse(black_box(&bytes), black_box(&mut back));
     });
 }
 

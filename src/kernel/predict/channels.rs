@@ -16,7 +16,7 @@ pub(super) fn base(channel: usize, channels: usize) -> Option<usize> {
 fn ordered<T: Lane>(value: T, numbers: Numbers) -> T {
     match numbers {
         Numbers::Integer => value,
-        Numbers::Float => value.from_float(),
+        Numbers::Float => value.ordered(),
     }
 }
 
@@ -24,7 +24,7 @@ fn ordered<T: Lane>(value: T, numbers: Numbers) -> T {
 fn restored<T: Lane>(value: T, numbers: Numbers) -> T {
     match numbers {
         Numbers::Integer => value,
-        Numbers::Float => value.to_float(),
+        Numbers::Float => value.unordered(),
     }
 }
 

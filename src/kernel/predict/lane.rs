@@ -47,9 +47,9 @@ pub trait Lane: Copy + Default + Eq + Ord + Debug + Send + Sync + 'static {
     /// Inverse of [`Self::zigzag`].
     fn unzigzag(self) -> Self;
     /// IEEE bit patterns in the order of the numbers they stand for.
-    fn from_float(self) -> Self;
-    /// Inverse of [`Self::from_float`].
-    fn to_float(self) -> Self;
+    fn ordered(self) -> Self;
+    /// Inverse of [`Self::ordered`].
+    fn unordered(self) -> Self;
     /// Bits that the size of a signed difference takes.
     fn magnitude_bits(self) -> Self;
     /// As a number.
@@ -109,12 +109,12 @@ macro_rules! lane {
                 (self >> 1) ^ (self & 1).wrapping_neg()
             }
             #[inline(always)]
-            fn from_float(self) -> Self {
+            fn ordered(self) -> Self {
                 let negative = (self >> (Self::BITS - 1)).wrapping_neg();
                 self ^ (negative | Self::HALF)
             }
             #[inline(always)]
-            fn to_float(self) -> Self {
+            fn unordered(self) -> Self {
                 let positive = (self >> (Self::BITS - 1)).wrapping_neg();
                 self ^ (!positive | Self::HALF)
             }

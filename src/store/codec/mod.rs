@@ -4,14 +4,15 @@
 //! is read by zarr-python with `python/btfkit_zarr`. `docs/codec.md` has the bytes and what was measured.
 
 mod delta;
+mod fused;
 mod pack;
-mod predictive;
 
 use std::num::NonZeroU64;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use btfkit_formats::SampleType;
+use serde_json::{Value, json};
 use zarrs::array::codec::api::{
     ArrayToArrayCodecTraits, ArrayToBytesCodecTraits, BytesToBytesCodecTraits, CodecMetadataOptions,
 };
@@ -21,8 +22,8 @@ use zarrs::metadata::v3::MetadataV3;
 use crate::error::{Error, Result};
 use crate::kernel::predict::Shape;
 use delta::DeltaCodec;
+use fused::PredictiveCodec;
 pub use pack::{ChunkCodec, MOST_CHANNELS};
-use predictive::PredictiveCodec;
 
 /// Level of the zstd codec: after a prediction higher levels hardly pack better, only slower.
 const ZSTD_LEVEL: i32 = 1;
@@ -48,18 +49,31 @@ impl Chain {
     /// The chain that an array's metadata name for chunks of this kind, if it is one of ours.
     ///
     /// `codecs` is the member `codecs` of its `zarr.json`; the chain is looked for in its shards too.
-    pub fn of(codecs: &serde_json::Value, chunk: &Chunk) -> Option<Self> {
-        let list = codecs.as_array()?;
-        let inner = match list.as_slice() {
-            [one] if one.get("name")? == "sharding_indexed" => one.pointer("/configuration/codecs")?,
-            _ => codecs,
-        };
-        let found: Vec<MetadataV3> = serde_json::from_value(inner.clone()).ok()?;
+    pub fn of(codecs: &Value, chunk: &Chunk) -> Option<Self> {
+        let found: Vec<MetadataV3> = serde_json::from_value(codecs.pointer(inner(codecs))?.clone()).ok()?;
         let is_found = |chain: &Self| {
             chunk_codecs(*chain, chunk).is_ok_and(|codecs| codecs.metadata().as_ref() == Some(&found))
         };
         [Self::Stock, Self::Predictive].into_iter().find(is_found)
     }
+}
+
+/// Where in a list of codecs those of chunks are.
+fn inner(codecs: &Value) -> &'static str {
+    let sharding = codecs.pointer("/0/name").is_some_and(|name| name == "sharding_indexed");
+    if sharding { "/0/configuration/codecs" } else { "" }
+}
+
+/// The same codecs in fewer steps, for an array to be read with: [`Chain::Stock`] becomes one codec, as zarrs' own
+/// transpositions are some fifty times as slow. Anything else stays. Not to be written to disk.
+pub fn fused(mut codecs: Value, chunk: &Chunk) -> Value {
+    if Chain::of(&codecs, chunk) == Some(Chain::Stock)
+        && let Some(inner) = codecs.pointer_mut(inner(&codecs))
+    {
+        let configuration = json!({"channel_axis": chunk.channels.is_some()});
+        *inner = json!([{"name": "btfkit.stock", "configuration": configuration}]);
+    }
+    codecs
 }
 
 impl FromStr for Chain {

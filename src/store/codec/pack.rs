@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use btfkit_formats::SampleType;
 use zstd::bulk::{Compressor, Decompressor};
-use zstd::zstd_safe::{CParameter, ParamSwitch};
+use zstd::zstd_safe::{CParameter, ParamSwitch, compress_bound};
 
 use super::{Chain, Chunk, Result, ZSTD_LEVEL, damaged};
 use crate::error::Error;
@@ -26,7 +26,10 @@ pub const MOST_CHANNELS: usize = 4096;
 pub struct ChunkCodec {
     chunk: Chunk,
     work: Work,
+    /// Residuals, or what else goes into zstd.
     packed: Vec<u8>,
+    /// Room for what a stream is compressed to.
+    frame: Vec<u8>,
     decompressor: Decompressor<'static>,
     compressor: Compressor<'static>,
 }
@@ -166,7 +169,9 @@ impl ChunkCodec {
             }
         };
         let decompressor = Decompressor::new().map_err(failed)?;
-        Ok(Self { chunk, work, packed: vec![0; chunk.bytes()], decompressor, compressor })
+        let packed = vec![0; chunk.bytes()];
+        let frame = vec![0; compress_bound(packed.len())];
+        Ok(Self { chunk, work, packed, frame, decompressor, compressor })
     }
 
     /// Appends the encoded chunk to `out`; `samples` are little-endian in C order.
@@ -178,7 +183,8 @@ impl ChunkCodec {
         match &mut self.work {
             Work::Stock(rearrange) => {
                 rearrange.forward(samples, &mut self.packed);
-                append(&mut self.compressor, &self.packed, out)?;
+                let length = compress(&mut self.compressor, &self.packed, &mut self.frame)?;
+                out.extend_from_slice(&self.frame[..length]);
             }
             Work::Predictive(predictor, modes) => {
                 predictor.forward(samples, &mut self.packed, modes);
@@ -189,13 +195,10 @@ impl ChunkCodec {
                 let lengths = out.len();
                 out.resize(lengths + 4 * (self.packed.len() / plane), 0);
                 for (number, bytes) in self.packed.chunks_exact(plane).enumerate() {
-                    let at = out.len();
-                    append(&mut self.compressor, bytes, out)?;
-                    if out.len() - at >= plane {
-                        out.truncate(at);
-                        out.extend_from_slice(bytes);
-                    }
-                    let length = (out.len() - at) as u32;
+                    let length = compress(&mut self.compressor, bytes, &mut self.frame)?;
+                    let stream = if length < plane { &self.frame[..length] } else { bytes };
+                    out.extend_from_slice(stream);
+                    let length = stream.len() as u32;
                     out[lengths + 4 * number..][..4].copy_from_slice(&length.to_le_bytes());
                 }
                 let checksum = crc32fast::hash(&out[start..]);
@@ -242,14 +245,9 @@ impl ChunkCodec {
     }
 }
 
-fn append(compressor: &mut Compressor<'_>, bytes: &[u8], out: &mut Vec<u8>) -> Result<()> {
-    let at = out.len();
-    out.resize(at + zstd::zstd_safe::compress_bound(bytes.len()), 0);
-    let length = compressor
-        .compress_to_buffer(bytes, &mut out[at..])
-        .map_err(|error| Error::internal(format!("zstd: {error}")))?;
-    out.truncate(at + length);
-    Ok(())
+/// Compresses into a buffer that is large enough for the worst; returns how many bytes that took.
+fn compress(compressor: &mut Compressor<'_>, bytes: &[u8], frame: &mut [u8]) -> Result<usize> {
+    compressor.compress_to_buffer(bytes, frame).map_err(|error| Error::internal(format!("zstd: {error}")))
 }
 
 /// Decompresses to exactly as many bytes as `out` has.

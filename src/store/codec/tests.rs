@@ -6,7 +6,9 @@ use std::path::Path;
 use btfkit_formats::f16;
 use serde_json::json;
 use zarrs::array::codec::api::ArrayToBytesCodecTraits as _;
-use zarrs::array::{Array, ArrayBuilder, ArrayBytes, CodecOptions, DataType, FillValue, data_type};
+use zarrs::array::{
+    Array, ArrayBuilder, ArrayBytes, ArraySubset, CodecOptions, DataType, FillValue, data_type,
+};
 
 use super::*;
 use crate::store::mapped::MappedStorage;
@@ -150,6 +152,12 @@ fn sharded_arrays_are_read_as_they_were_written_and_name_their_chain() {
         let metadata = std::fs::read(folder.join(&name_of(chain, &chunk)[1..]).join("zarr.json")).unwrap();
         let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
         assert_eq!(Chain::of(&metadata["codecs"], &chunk), Some(chain), "{}", metadata["codecs"]);
+        let mut reading = metadata.clone();
+        reading["codecs"] = fused(reading["codecs"].take(), &chunk);
+        assert_eq!(reading != metadata, chain == Chain::Stock);
+        let reading = serde_json::from_value(reading).unwrap();
+        let array = Array::new_with_metadata(storage.clone(), &name_of(chain, &chunk), reading).unwrap();
+        check_fixture(&array, &chunk);
     }
 }
 

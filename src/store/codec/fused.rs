@@ -1,4 +1,4 @@
-//! The Zarr codec `btfkit.predictive`.
+//! A chain as one Zarr codec: `btfkit.predictive`, and `btfkit.stock` for reading only (see [`super::fused`]).
 
 use std::borrow::Cow;
 use std::num::NonZeroU64;
@@ -15,15 +15,18 @@ use zarrs::array::{
 };
 use zarrs::metadata::Configuration;
 use zarrs::metadata::v3::MetadataV3;
-use zarrs::plugin::{PluginCreateError, ZarrVersion};
+use zarrs::plugin::{ExtensionName, PluginCreateError, ZarrVersion};
 
 use super::{Chain, Chunk, ChunkCodec, extent};
 
 /// Array to bytes, entropy coding and checksum included.
 #[derive(Clone, Debug)]
-pub(super) struct PredictiveCodec {
+pub(super) struct FusedCodec<const STOCK: bool> {
     configuration: Settings,
 }
+
+pub(super) type PredictiveCodec = FusedCodec<false>;
+type StockCodec = FusedCodec<true>;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -32,13 +35,16 @@ struct Settings {
     channel_axis: bool,
 }
 
-impl PredictiveCodec {
+impl<const STOCK: bool> FusedCodec<STOCK> {
+    const CHAIN: Chain = if STOCK { Chain::Stock } else { Chain::Predictive };
+
     pub(super) fn new(channel_axis: bool) -> Self {
         Self { configuration: Settings { channel_axis } }
     }
 
     fn chunk(&self, shape: &[NonZeroU64], data_type: &DataType) -> Result<Chunk, CodecError> {
-        let unsupported = || CodecError::UnsupportedDataType(data_type.clone(), NAME.to_owned());
+        let unsupported =
+            || CodecError::UnsupportedDataType(data_type.clone(), Self::CHAIN.name().to_owned());
         let name = data_type.name_v3().ok_or_else(unsupported)?;
         let samples = [SampleType::U8, SampleType::U16, SampleType::F16, SampleType::F32]
             .into_iter()
@@ -46,40 +52,48 @@ impl PredictiveCodec {
             .ok_or_else(unsupported)?;
         let channel_axis = self.configuration.channel_axis;
         let (shape, channels) = extent(shape, channel_axis)
-            .ok_or_else(|| CodecError::Other(format!("{NAME}: chunks of {shape:?} are too large")))?;
+            .ok_or_else(|| CodecError::Other(format!("chunks of {shape:?} are too large")))?;
         Ok(Chunk { samples, shape, channels: channel_axis.then_some(channels) })
     }
 
     fn codec(&self, shape: &[NonZeroU64], data_type: &DataType) -> Result<(ChunkCodec, Chunk), CodecError> {
         let chunk = self.chunk(shape, data_type)?;
         if cfg!(target_endian = "big") && chunk.samples.bytes() > 1 {
-            return Err(CodecError::Other(format!("{NAME}: only little-endian machines can do this")));
+            return Err(CodecError::Other("only little-endian machines can do this".to_owned()));
         }
-        Ok((ChunkCodec::new(Chain::Predictive, chunk).map_err(failed)?, chunk))
+        Ok((ChunkCodec::new(Self::CHAIN, chunk).map_err(failed)?, chunk))
     }
 }
 
 #[allow(clippy::needless_pass_by_value)] // as `map_err` hands it
 fn failed(error: crate::error::Error) -> CodecError {
-    CodecError::Other(format!("{NAME}: {error}"))
+    CodecError::Other(format!("btfkit: {error}"))
 }
 
-const NAME: &str = "btfkit.predictive";
-
 zarrs::plugin::impl_extension_aliases!(PredictiveCodec, v3: "btfkit.predictive");
+zarrs::plugin::impl_extension_aliases!(StockCodec, v3: "btfkit.stock");
 
 inventory::submit! {
     CodecPluginV3::new::<PredictiveCodec>()
 }
+inventory::submit! {
+    CodecPluginV3::new::<StockCodec>()
+}
 
-impl CodecTraitsV3 for PredictiveCodec {
+impl<const STOCK: bool> CodecTraitsV3 for FusedCodec<STOCK>
+where
+    Self: ExtensionName,
+{
     fn create(metadata: &MetadataV3) -> Result<Codec, PluginCreateError> {
         let configuration = metadata.to_typed_configuration()?;
         Ok(Codec::ArrayToBytes(Arc::new(Self { configuration })))
     }
 }
 
-impl CodecTraits for PredictiveCodec {
+impl<const STOCK: bool> CodecTraits for FusedCodec<STOCK>
+where
+    Self: ExtensionName,
+{
     fn as_any(&self) -> &dyn std::any::Any {
         self
     }
@@ -99,7 +113,10 @@ impl CodecTraits for PredictiveCodec {
     }
 }
 
-impl ArrayCodecTraits for PredictiveCodec {
+impl<const STOCK: bool> ArrayCodecTraits for FusedCodec<STOCK>
+where
+    Self: ExtensionName,
+{
     fn recommended_concurrency(
         &self,
         _shape: &[NonZeroU64],
@@ -109,7 +126,10 @@ impl ArrayCodecTraits for PredictiveCodec {
     }
 }
 
-impl ArrayToBytesCodecTraits for PredictiveCodec {
+impl<const STOCK: bool> ArrayToBytesCodecTraits for FusedCodec<STOCK>
+where
+    Self: ExtensionName,
+{
     fn into_dyn(self: Arc<Self>) -> Arc<dyn ArrayToBytesCodecTraits> {
         self
     }
@@ -121,10 +141,11 @@ impl ArrayToBytesCodecTraits for PredictiveCodec {
         _fill_value: &FillValue,
     ) -> Result<BytesRepresentation, CodecError> {
         let chunk = self.chunk(shape, data_type)?;
-        // Streams that do not shrink are stored as they are.
+        // Streams that do not shrink are stored as they are; zstd alone adds a little.
         let channels = chunk.channels.unwrap_or(1);
         let header = 1 + channels + 4 * channels * chunk.samples.bytes() + 4;
-        Ok(BytesRepresentation::BoundedSize((chunk.bytes() + header) as u64))
+        let bound = zstd::zstd_safe::compress_bound(chunk.bytes()) + header;
+        Ok(BytesRepresentation::BoundedSize(bound as u64))
     }
 
     fn encode<'a>(

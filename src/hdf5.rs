@@ -2,7 +2,7 @@
 //! feature `hdf5`, since the format is left to its C library; what is here without it says so.
 //!
 //! Two layouts are read: a list of images with a pair of directions each (`ground_color`, as the NeuralBTF project
-//! publishes them), and our own, which has the arrays and attributes of a measurement store. `docs/formats.md` has both.
+//! publishes them), and our own, which has the arrays and attributes of a measurement store. `docs/formats/hdf5.md` has both.
 
 #[cfg(feature = "hdf5")]
 mod archive;

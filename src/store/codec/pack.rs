@@ -149,24 +149,24 @@ impl ChunkCodec {
         }
         let failed = |error: std::io::Error| Error::internal(format!("zstd: {error}"));
         let mut compressor = Compressor::new(ZSTD_LEVEL).map_err(failed)?;
+        if chain == Chain::Predictive || chunk.has_deltas() {
+            // Residuals hardly repeat: look for long matches only, give up soon, and leave the rest to the
+            // entropy coder, which the level would switch off for such haste.
+            for parameter in [
+                CParameter::MinMatch(7),
+                CParameter::HashLog(12),
+                CParameter::TargetLength(16),
+                CParameter::LiteralCompressionMode(ParamSwitch::Enable),
+            ] {
+                compressor.set_parameter(parameter).map_err(failed)?;
+            }
+        }
         let work = match chain {
             Chain::Stock => {
                 compressor.include_checksum(true).map_err(failed)?;
                 Work::Stock(rearrange(&chunk))
             }
-            Chain::Predictive => {
-                // Residuals hardly repeat: look for long matches only, give up soon, and leave the rest to the
-                // entropy coder, which the level would switch off for such haste.
-                for parameter in [
-                    CParameter::MinMatch(7),
-                    CParameter::HashLog(12),
-                    CParameter::TargetLength(16),
-                    CParameter::LiteralCompressionMode(ParamSwitch::Enable),
-                ] {
-                    compressor.set_parameter(parameter).map_err(failed)?;
-                }
-                Work::Predictive(predict(&chunk), Vec::new())
-            }
+            Chain::Predictive => Work::Predictive(predict(&chunk), Vec::new()),
         };
         let decompressor = Decompressor::new().map_err(failed)?;
         let packed = vec![0; chunk.bytes()];

@@ -86,9 +86,13 @@ impl<'a> Store<'a> {
             .bytes_to_bytes_codecs(codecs.bytes_to_bytes)
             .build(Arc::new(MappedStorage::new(path)), "/a")
             .unwrap();
-        array
-            .store_metadata_opt(&ArrayMetadataOptions::default().with_include_zarrs_metadata(false))
-            .unwrap();
+        let options = ArrayMetadataOptions::default().with_include_zarrs_metadata(false);
+        array.store_metadata_opt(&options).unwrap();
+        // As the program reads it.
+        let mut metadata = serde_json::to_value(array.metadata_opt(&options)).unwrap();
+        metadata["codecs"] = fused(metadata["codecs"].take(), &chunk);
+        let metadata = serde_json::from_value(metadata).unwrap();
+        let array = Array::new_with_metadata(array.storage(), "/a", metadata).unwrap();
         let codec = ChunkCodec::new(chain, chunk).unwrap();
         Self { samples, path: path.to_owned(), side, lights, codec, array, chunk: vec![0; chunk.bytes()] }
     }

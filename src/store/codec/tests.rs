@@ -130,9 +130,17 @@ fn fixture_kinds() -> impl Iterator<Item = (Chain, Chunk)> {
 
 fn check_fixture(array: &Array<MappedStorage>, chunk: &Chunk) {
     let whole = Chunk { shape: Shape { rows: 7, columns: 11, ..chunk.shape }, ..*chunk };
-    let found =
-        array.retrieve_array_subset_opt::<ArrayBytes<'_>>(&array.subset_all(), &CodecOptions::default());
-    assert!(*found.unwrap().into_fixed().unwrap() == chunk_samples(&whole, 0, 0), "{}", array.path());
+    let read = |subset: &ArraySubset| -> Vec<u8> {
+        let found = array.retrieve_array_subset_opt::<ArrayBytes<'_>>(subset, &CodecOptions::default());
+        found.unwrap().into_fixed().unwrap().into_owned()
+    };
+    assert!(read(&array.subset_all()) == chunk_samples(&whole, 0, 0), "{}", array.path());
+    // A part that begins and ends within chunks.
+    let part = Chunk { shape: Shape { rows: 3, columns: 6, ..chunk.shape }, ..*chunk };
+    let mut start = vec![0; array.dimensionality()];
+    (start[1], start[2]) = (2, 3);
+    let subset = ArraySubset::new_with_start_shape(start, extents(&part)).unwrap();
+    assert!(read(&subset) == chunk_samples(&part, 2, 3), "{}", array.path());
 }
 
 /// Writes the fixtures of `python/tests` where `BTFKIT_WRITE_FIXTURES` says.

@@ -24,5 +24,6 @@ pub mod shape;
 pub mod stage;
 pub mod store;
 pub mod texel;
+pub mod views;
 
 pub use error::{Error, Kind, Result};

@@ -1,6 +1,7 @@
 //! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
 
 mod analyse;
+mod check;
 mod demo;
 mod enlarge;
 mod image;
@@ -73,6 +74,7 @@ enum Command {
     Demo(demo::Demo),
     Sample(sample::Sample),
     Info(info::Info),
+    Check(check::Check),
     Import(import::Import),
     Model(analyse::Whole),
     Tile(analyse::Tile),
@@ -124,6 +126,7 @@ impl Command {
             Self::Demo(command) => command.run(context, tell),
             Self::Sample(command) => command.run(context, tell),
             Self::Info(command) => command.run(tell),
+            Self::Check(command) => command.run(context, tell),
             Self::Import(command) => command.run(context, tell),
             Self::Model(command) => command.run(context, tell),
             Self::Tile(command) => command.run(context, tell),

@@ -46,6 +46,11 @@ pub struct Description {
 }
 
 impl Description {
+    /// Samples of a texel under one pair of directions.
+    pub fn n_channels(&self) -> usize {
+        self.channels
+    }
+
     /// Bytes of one view's samples.
     pub fn view_bytes(&self) -> u64 {
         (self.size.texels() * self.lights.len() * self.channels) as u64

@@ -35,10 +35,11 @@ impl Neighbourhood {
         let mut spacings = Vec::with_capacity(directions.len());
         let weights = (0..directions.len())
             .map(|of| {
-                let near = nearest(directions, of);
-                let spacing = median(near.iter().map(|&(_, angle)| angle));
-                spacings.push(spacing);
-                local_fit(directions, of, &near, spacing)
+                let mut near = nearest(directions, directions[of], NEIGHBOURS + 1);
+                near.retain(|&(other, _)| other != of);
+                near.truncate(NEIGHBOURS);
+                spacings.push(median(near.iter().map(|&(_, angle)| angle)));
+                local_fit(directions, directions[of], &near)
             })
             .collect();
         Self { weights, spacing_rad: median(spacings) }
@@ -60,20 +61,36 @@ impl Neighbourhood {
     }
 }
 
-/// The nearest other directions and their angles, nearest first.
-fn nearest(directions: &[Direction], of: usize) -> Vec<(usize, f64)> {
-    let mut others: Vec<(usize, f64)> = (0..directions.len())
-        .filter(|&other| other != of)
-        .map(|other| (other, angle(directions[of], directions[other])))
-        .collect();
-    others.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
-    others.truncate(NEIGHBOURS);
-    others
+/// Weights by which values at the directions of a list give the value at any direction: that of the list's own if one
+/// is nearer than `same_rad`, else a locally linear fit. None where the list has nothing within `reach_rad`.
+pub(super) fn interpolation(
+    directions: &[Direction],
+    at: Direction,
+    same_rad: f64,
+    reach_rad: f64,
+) -> Option<Vec<(usize, f64)>> {
+    let near = nearest(directions, at, NEIGHBOURS);
+    let &(first, angle) = near.first()?;
+    match angle {
+        _ if angle < same_rad => Some(vec![(first, 1.0)]),
+        _ if angle < reach_rad => Some(local_fit(directions, at, &near)),
+        _ => None,
+    }
 }
 
-fn local_fit(directions: &[Direction], of: usize, near: &[(usize, f64)], spacing: f64) -> Vec<(usize, f64)> {
-    let centre = Vector3::from(directions[of].vector());
-    let (sin_phi, cos_phi) = directions[of].phi_rad.sin_cos();
+/// The directions nearest to one and their angles, nearest first.
+fn nearest(directions: &[Direction], to: Direction, count: usize) -> Vec<(usize, f64)> {
+    let mut all: Vec<(usize, f64)> =
+        directions.iter().enumerate().map(|(number, &other)| (number, angle(to, other))).collect();
+    all.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    all.truncate(count);
+    all
+}
+
+fn local_fit(directions: &[Direction], at: Direction, near: &[(usize, f64)]) -> Vec<(usize, f64)> {
+    let spacing = median(near.iter().map(|&(_, angle)| angle));
+    let centre = Vector3::from(at.vector());
+    let (sin_phi, cos_phi) = at.phi_rad.sin_cos();
     let tangent = Vector3::new(-sin_phi, cos_phi, 0.0);
     let bitangent = centre.cross(&tangent);
     let rows: Vec<(Vector3<f64>, f64)> = near

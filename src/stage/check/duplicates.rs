@@ -102,7 +102,11 @@ pub fn check(statistics: &Statistics) -> Check {
             directions: places,
         });
     }
-    let detail = format!("least relative difference of two images {least:.4} (alarm below {NEARLY})");
+    let least_percent = 100.0 * least;
+    let detail = format!(
+        "no two images are nearer than {least_percent:.2} %, nearly equal below {:.2} %",
+        100.0 * NEARLY
+    );
     Check::done(NAME, detail, NEARLY / least.max(1e-9), findings)
 }
 
@@ -137,7 +141,7 @@ type Pair = ((usize, usize), (usize, usize), f64);
 /// The least difference of two images, and those below the threshold. Sorted by mean, few need comparing.
 fn nearly_equal(candidates: &[Candidate<'_>]) -> (f64, Vec<Pair>) {
     /// Means of pairs that are compared, relative to each other: beyond it the least difference is not exact.
-    const REACH: f64 = 4.0 * NEARLY;
+    const REACH: f64 = 10.0 * NEARLY;
     let mut least = REACH;
     let mut found = Vec::new();
     for (number, a) in candidates.iter().enumerate() {

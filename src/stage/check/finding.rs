@@ -109,7 +109,7 @@ impl Check {
         findings: Vec<Finding>,
     ) -> Self {
         let state = if findings.is_empty() { State::Ok } else { State::Finding };
-        Self { name, state, detail: detail.into(), alarm: Some(round(alarm, 3)), findings }
+        Self { name, state, detail: detail.into(), alarm: Some(round(alarm.abs(), 3)), findings }
     }
 
     /// Why the data do not tell.

@@ -6,6 +6,7 @@
 
 use std::collections::HashSet;
 
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::{Alike, Neighbourhood, angle};
@@ -35,14 +36,14 @@ const FLOOR: f64 = 0.04;
 const SUSPECTS: usize = 256;
 
 /// Two suspects are exchanged if each correlates this well with the prediction at the other's place ...
-const FIT: f64 = 0.75;
+const FIT: f64 = 0.8;
 
 /// ... and by this much better than at its own.
-const BETTER: f64 = 0.35;
+const BETTER: f64 = 0.5;
 
 /// A single image that belongs elsewhere must fit there nearly perfectly, and far better.
-const FIT_ALONE: f64 = 0.9;
-const BETTER_ALONE: f64 = 0.7;
+const FIT_ALONE: f64 = 0.93;
+const BETTER_ALONE: f64 = 1.0;
 
 /// Patterns of all images, [view, light, cell].
 struct Patterns {
@@ -132,8 +133,10 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
             format!("images differ by {contrast:.3} in pattern only, expected {LEAST_CONTRAST}"),
         );
     }
-    let fits: Vec<Fit> =
-        (0..patterns.values.len()).map(|at| fit(&patterns, &near_lights, &near_views, at)).collect();
+    let fits: Vec<Fit> = (0..patterns.values.len())
+        .into_par_iter()
+        .map(|at| fit(&patterns, &near_lights, &near_views, at))
+        .collect();
     let own: Vec<f64> = fits.iter().map(|fit| fit.own).collect();
     let contrasts = Alike::new(&statistics.views, &statistics.lights).contrast(&own);
     let place = |at: usize| Place::image(at / patterns.lights, at % patterns.lights);

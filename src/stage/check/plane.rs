@@ -153,7 +153,8 @@ pub(super) struct Displacement {
     pub(super) correlation_in_place: f64,
 }
 
-/// By normalised cross-correlation, the peak refined by parabolas.
+/// By normalised cross-correlation, the peak refined by parabolas. None if the best is at the end of the search: there
+/// is no peak.
 pub(super) fn displacement(of: &Plane, against: &Plane, reach: usize) -> Option<Displacement> {
     let Size { height, width } = of.size;
     if height < 4 * reach || width < 4 * reach {
@@ -169,9 +170,11 @@ pub(super) fn displacement(of: &Plane, against: &Plane, reach: usize) -> Option<
         if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 }
     };
     let inside = |at: usize| at > 0 && at + 1 < across;
-    let down =
-        if inside(y) { refine(scores[best - across], scores[best], scores[best + across]) } else { 0.0 };
-    let right = if inside(x) { refine(scores[best - 1], scores[best], scores[best + 1]) } else { 0.0 };
+    if !inside(y) || !inside(x) {
+        return None;
+    }
+    let down = refine(scores[best - across], scores[best], scores[best + across]);
+    let right = refine(scores[best - 1], scores[best], scores[best + 1]);
     Some(Displacement {
         down: y as f64 - reach as f64 + down,
         right: x as f64 - reach as f64 + right,

@@ -13,10 +13,11 @@
 
 use serde_json::json;
 
-use super::angular::angle;
+use super::angular::interpolation;
 use super::finding::{Check, Finding, Severity, confidence, round};
 use super::statistics::{DECLARED, READINGS, Statistics, deviation};
 use crate::color::Transfer;
+use crate::texel::direction::Direction;
 
 /// Name of the check.
 pub const NAME: &str = "radiometry";
@@ -24,14 +25,17 @@ pub const NAME: &str = "radiometry";
 /// Code of the finding that makes others pointless.
 pub const SWAPPED: &str = "light-view-swapped";
 
-/// Greatest angle between a view and the light that counts as the same direction.
+/// A light this near to a view has its direction; else its neighbours are interpolated.
 const SAME_DEG: f64 = 1.5;
+
+/// Lights farther from a view's direction than this do not tell what one there would show.
+const REACH_DEG: f64 = 20.0;
 
 /// Pairs must differ in the logarithm of their cosines by this much, 5 degrees against 45 do by 0.35.
 const LEAST_DIFFERENCE: f64 = 0.1;
 
 /// Fewer pairs than this say nothing.
-const LEAST_PAIRS: usize = 6;
+const LEAST_PAIRS: usize = 15;
 
 /// How far the exponent of a good measurement may be from 1.
 const TOLERANCE: f64 = 0.2;
@@ -80,28 +84,24 @@ pub fn check(statistics: &Statistics) -> Check {
 /// The exponents, if enough images have a reciprocal partner.
 fn exponents(statistics: &Statistics) -> Option<Exponents> {
     let (views, lights) = (&statistics.views, &statistics.lights);
-    let matched: Vec<(usize, usize)> = (0..views.len())
-        .filter_map(|view| {
-            let light = (0..lights.len())
-                .min_by(|&a, &b| angle(views[view], lights[a]).total_cmp(&angle(views[view], lights[b])))?;
-            (angle(views[view], lights[light]) < SAME_DEG.to_radians()).then_some((view, light))
-        })
+    let levels = Levels::new(statistics);
+    // What lights in the views' own directions would show, from the lights there are.
+    let as_light: Vec<Option<Vec<(usize, f64)>>> = views
+        .iter()
+        .map(|&view| interpolation(lights, view, SAME_DEG.to_radians(), REACH_DEG.to_radians()))
         .collect();
-    let usable = |view: usize, light: usize| {
-        let image = statistics.image(view, light);
-        let clipped = statistics.clipped_share(view, light) > CLIPPED;
-        !statistics.is_black(view, light) && !clipped && image.means.iter().all(|mean| *mean > 0.0)
-    };
     let mut pairs = Vec::new();
-    for (number, &(view_a, light_a)) in matched.iter().enumerate() {
-        for &(view_b, light_b) in &matched[..number] {
-            let cosine = |light: usize| lights[light].theta_rad.cos().max(1e-3);
-            let x = (cosine(light_b) / cosine(light_a)).ln();
-            if x.abs() >= LEAST_DIFFERENCE && usable(view_a, light_b) && usable(view_b, light_a) {
-                let (a, b) = (statistics.image(view_a, light_b), statistics.image(view_b, light_a));
-                let y: [f64; READINGS] =
-                    std::array::from_fn(|reading| (a.means[reading] / b.means[reading]).ln());
-                pairs.push((x, y));
+    for a in 0..views.len() {
+        for b in 0..a {
+            let (Some(light_a), Some(light_b)) = (&as_light[a], &as_light[b]) else { continue };
+            let x = (cosine(views[b]) / cosine(views[a])).ln();
+            if x.abs() < LEAST_DIFFERENCE {
+                continue;
+            }
+            if let (Some(first), Some(second)) = (levels.at(a, light_b), levels.at(b, light_a)) {
+                let k: [f64; READINGS] =
+                    std::array::from_fn(|reading| 1.0 + (first[reading] - second[reading]) / x);
+                pairs.push((x.abs(), k));
             }
         }
     }
@@ -109,10 +109,47 @@ fn exponents(statistics: &Statistics) -> Option<Exponents> {
         return None;
     }
     let by_reading = std::array::from_fn(|reading| {
-        weighted_median(pairs.iter().map(|(x, y)| (y[reading] / x, x.abs())).collect())
+        weighted_median(pairs.iter().map(|(weight, k)| (k[reading], *weight)).collect())
     });
-    let residuals: Vec<f64> = pairs.iter().map(|(x, y)| y[DECLARED] - by_reading[DECLARED] * x).collect();
+    let residuals: Vec<f64> =
+        pairs.iter().map(|(weight, k)| (k[DECLARED] - by_reading[DECLARED]) * weight).collect();
     Some(Exponents { by_reading, pairs: pairs.len(), scatter: deviation(&residuals) })
+}
+
+fn cosine(direction: Direction) -> f64 {
+    direction.theta_rad.cos().max(1e-3)
+}
+
+/// Logarithms of the means of all images by all readings, the light's cosine divided out: smooth in angle.
+struct Levels {
+    /// Nothing for images that are black or clipped.
+    values: Vec<Option<[f64; READINGS]>>,
+    lights: usize,
+}
+
+impl Levels {
+    fn new(statistics: &Statistics) -> Self {
+        let lights = statistics.lights.len();
+        let level = |at: usize| {
+            let (view, light) = (at / lights, at % lights);
+            let means = statistics.images[at].means;
+            let usable = !statistics.is_black(view, light)
+                && statistics.clipped_share(view, light) <= CLIPPED
+                && means.iter().all(|mean| *mean > 0.0);
+            usable.then(|| means.map(|mean| (mean / cosine(statistics.lights[light])).ln()))
+        };
+        Self { values: (0..statistics.images.len()).map(level).collect(), lights }
+    }
+
+    /// Under a view, for weighted lights.
+    fn at(&self, view: usize, light: &[(usize, f64)]) -> Option<[f64; READINGS]> {
+        let mut sum = [0.0; READINGS];
+        for &(light, weight) in light {
+            let values = self.values[view * self.lights + light]?;
+            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
+        }
+        Some(sum)
+    }
 }
 
 /// The value with half of the weight at either side: exposures that jump move it little.

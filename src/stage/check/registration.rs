@@ -4,6 +4,7 @@
 //! lies above the plane one way and what lies below the other, a view that was rectified badly moves as a whole against all its
 //! neighbours.
 
+use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::Neighbourhood;
@@ -22,6 +23,10 @@ const LEAST_SIDE: usize = 4 * REACH;
 
 /// Neighbours that each view is laid upon.
 const NEIGHBOURS: usize = 5;
+
+/// How many of them must agree, and by how many texels.
+const MOST: usize = 3;
+const AGREE: f64 = 1.0;
 
 /// Displacement that counts, texels ...
 const DISPLACED: f64 = 1.4;
@@ -76,16 +81,16 @@ pub fn check(statistics: &Statistics) -> Check {
         })
         .collect();
     let near = Neighbourhood::new(&statistics.views);
-    let offsets: Vec<Option<Offset>> = (0..count).map(|view| offset(&pictures, &near, view)).collect();
+    let offsets: Vec<Option<Offset>> =
+        (0..count).into_par_iter().map(|view| offset(&pictures, &near, view)).collect();
     let mut worst: f64 = 0.0;
     let mut displaced = Vec::new();
     let mut unclear = 0;
     for (view, offset) in offsets.iter().enumerate() {
-        let Some(offset) = offset else { continue };
-        if offset.correlation < CORRELATION {
+        let Some(offset) = offset.as_ref().filter(|offset| offset.correlation >= CORRELATION) else {
             unclear += 1;
             continue;
-        }
+        };
         let alike = |other: usize| {
             let apart = statistics.views[other].theta_rad - statistics.views[view].theta_rad;
             other != view && apart.abs() < ELEVATION_DEG.to_radians()
@@ -104,7 +109,7 @@ pub fn check(statistics: &Statistics) -> Check {
         }
     }
     if unclear == count {
-        return Check::not_checked(NAME, format!("no view correlates with its neighbours by {CORRELATION}"));
+        return Check::not_checked(NAME, "no view looks enough like its neighbours to be laid upon them");
     }
     let largest = offsets
         .iter()
@@ -119,19 +124,21 @@ pub fn check(statistics: &Statistics) -> Check {
     Check::done(NAME, detail, worst, finding(statistics, &displaced).into_iter().collect())
 }
 
-/// The median displacement of a view against its neighbours.
+/// The median displacement of a view against its neighbours, if most of them agree about it.
 fn offset(pictures: &[Plane], near: &Neighbourhood, view: usize) -> Option<Offset> {
     let found: Vec<_> = near
         .of(view)
         .take(NEIGHBOURS)
         .filter_map(|other| displacement(&pictures[view], &pictures[other], REACH))
         .collect();
-    (!found.is_empty()).then(|| Offset {
+    let offset = Offset {
         down: median(found.iter().map(|d| d.down)),
         right: median(found.iter().map(|d| d.right)),
         correlation: median(found.iter().map(|d| d.correlation)),
         gain: median(found.iter().map(|d| d.correlation - d.correlation_in_place)),
-    })
+    };
+    let agree = found.iter().filter(|d| (d.down - offset.down).hypot(d.right - offset.right) < AGREE).count();
+    (agree >= MOST).then_some(offset)
 }
 
 fn finding(statistics: &Statistics, displaced: &[(usize, &Offset, f64)]) -> Option<Finding> {

@@ -79,7 +79,9 @@ pub fn numbers(statistics: &Statistics) -> Check {
             directions: only(&negative),
         });
     }
-    Check::done(NUMBERS, format!("{count} samples below zero, the least {least}"), times, findings)
+    let detail =
+        if count > 0 { format!("{count} samples below zero, the least {least}") } else { String::new() };
+    Check::done(NUMBERS, detail, times, findings)
 }
 
 /// Looks for images on which nothing was photographed.
@@ -115,7 +117,8 @@ pub fn black(statistics: &Statistics) -> Check {
 /// Looks for samples at the largest value.
 pub fn saturation(statistics: &Statistics) -> Check {
     let of_image = ranked(statistics, |view, light| statistics.clipped_share(view, light));
-    let share = of_image.iter().map(|(_, share)| share).sum::<f64>() / statistics.images.len().max(1) as f64;
+    let share =
+        of_image.iter().fold(0.0, |sum, (_, share)| sum + share) / statistics.images.len().max(1) as f64;
     let count = share * statistics.samples as f64 * statistics.images.len() as f64;
     let worst = of_image.first().map_or(0.0, |(_, share)| *share);
     let detail = format!(

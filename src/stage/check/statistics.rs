@@ -1,5 +1,7 @@
 //! What the diagnoses look at, gathered in one pass over the views.
 
+use btfkit_formats::SampleType;
+
 use crate::color::{Transfer, luminance, srgb_decode, srgb_encode};
 use crate::error::Result;
 use crate::run::progress::Counted;
@@ -193,15 +195,34 @@ fn brightness(channels: usize, value: impl Fn(usize) -> f64) -> f64 {
     }
 }
 
-/// Brightness of a sample read with one decoding fewer than declared, as declared, with one more.
-fn readings(transfer: Transfer, stored: &[f32]) -> [f64; READINGS] {
-    let plain = |s: f64| s;
-    let twice = |s: f64| srgb_decode(srgb_decode(s));
-    let curves: [fn(f64) -> f64; READINGS] = match transfer {
-        Transfer::Srgb => [plain, srgb_decode, twice],
-        Transfer::Linear => [srgb_encode, plain, srgb_decode],
-    };
-    curves.map(|curve| brightness(stored.len(), |channel| curve(f64::from(stored[channel]))))
+/// The curves of [`Image::means`]: one sRGB decoding fewer than declared, as declared, one more.
+struct Readings {
+    curves: [fn(f64) -> f64; READINGS],
+    /// Their values for 8-bit samples.
+    table: Vec<[f64; READINGS]>,
+}
+
+impl Readings {
+    fn new(transfer: Transfer, sample_type: SampleType) -> Self {
+        let curves: [fn(f64) -> f64; READINGS] = match transfer {
+            Transfer::Srgb => [|s| s, srgb_decode, |s| srgb_decode(srgb_decode(s))],
+            Transfer::Linear => [srgb_encode, |s| s, srgb_decode],
+        };
+        let codes = if sample_type == SampleType::U8 { 0..256 } else { 0..0 };
+        let table = codes.map(|code| curves.map(|curve| curve(f64::from(code) / 255.0))).collect();
+        Self { curves, table }
+    }
+
+    fn of(&self, stored: &[f32]) -> [f64; READINGS] {
+        std::array::from_fn(|reading| {
+            brightness(stored.len(), |channel| {
+                match self.table.get((stored[channel] * 255.0).round() as usize) {
+                    Some(values) => values[reading],
+                    None => self.curves[reading](f64::from(stored[channel])),
+                }
+            })
+        })
+    }
 }
 
 /// Sums over the texels of one view.
@@ -211,6 +232,7 @@ struct Sums<'a> {
     /// Rows and columns of the thumbnails.
     cells: Size,
     tried: u64,
+    readings: Readings,
 }
 
 fn of_view(source: &dyn Views, view: usize, frontal: bool) -> Result<ViewStatistics> {
@@ -219,7 +241,7 @@ fn of_view(source: &dyn Views, view: usize, frontal: bool) -> Result<ViewStatist
     let (lights, channels) = (description.lights.len(), description.n_channels());
     let samples = source.read_view(view, description.size.window())?;
     let window = middle(description.size);
-    let mut sums = Sums::new(description);
+    let mut sums = Sums::new(description, samples.sample_type());
     let mut mean = Vec::with_capacity(window.size.texels());
     let mut kept = Vec::new();
     for y in 0..height {
@@ -248,16 +270,17 @@ fn luminance_of(sample: &[f32]) -> f32 {
 }
 
 impl<'a> Sums<'a> {
-    fn new(description: &'a Description) -> Self {
+    fn new(description: &'a Description, sample_type: SampleType) -> Self {
         let Size { height, width } = description.size;
         let cells = Size::new(THUMBNAIL_SIDE.min(height), THUMBNAIL_SIDE.min(width));
+        let readings = Readings::new(description.transfer, sample_type);
         let image = Image {
             thumbnail: vec![0.0; cells.texels()],
             largest: f32::NEG_INFINITY,
             hash: 0xcbf2_9ce4_8422_2325,
             ..Image::default()
         };
-        Self { description, images: vec![image; description.lights.len()], cells, tried: 0 }
+        Self { description, images: vec![image; description.lights.len()], cells, tried: 0, readings }
     }
 
     /// Adds a row of texels: samples as stored [x, light, channel] and luminance [x, light].
@@ -279,7 +302,7 @@ impl<'a> Sums<'a> {
                 image.thumbnail[cell] += light;
                 sample.iter().for_each(|&s| image.add_sample(s));
                 if tried {
-                    let read = readings(self.description.transfer, sample);
+                    let read = self.readings.of(sample);
                     let finite = read.iter().all(|value| value.is_finite());
                     image
                         .means

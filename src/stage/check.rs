@@ -61,15 +61,23 @@ pub fn examine(statistics: &Statistics) -> Report {
         vec![samples::numbers(statistics), samples::black(statistics), samples::saturation(statistics)];
     checks.push(duplicates::check(statistics));
     checks.push(radiometry::check(statistics));
-    let swapped =
-        checks.iter().flat_map(|check| &check.findings).any(|finding| finding.code == radiometry::SWAPPED);
-    if swapped {
-        let reason = "light and view are exchanged: import with --swap and check again";
+    if has(&checks, &[radiometry::SWAPPED]) {
         let names = [azimuth::NAME, misplaced::NAME, exposure::NAME, registration::NAME];
-        checks.extend(names.map(|name| Check::not_checked(name, reason)));
+        checks.extend(
+            names.map(|name| Check::not_checked(name, "light and view are exchanged: repair that first")),
+        );
         return Report { checks };
     }
     checks.push(azimuth::check(statistics));
+    if has(&checks, &azimuth::APART) {
+        // Which images are alike depends on the azimuth between light and view.
+        let names = [misplaced::NAME, exposure::NAME];
+        checks.extend(names.map(|name| {
+            Check::not_checked(name, "azimuths of light and view contradict: repair that first")
+        }));
+        checks.push(registration::check(statistics));
+        return Report { checks };
+    }
     let misplaced = misplaced::check(statistics, &explained(&checks, &[samples::BLACK, duplicates::NAME]));
     checks.push(misplaced);
     let names = [samples::BLACK, duplicates::NAME, misplaced::NAME, samples::NUMBERS];
@@ -77,6 +85,11 @@ pub fn examine(statistics: &Statistics) -> Report {
     checks.push(exposure);
     checks.push(registration::check(statistics));
     Report { checks }
+}
+
+/// Whether there is a finding of one of these codes.
+fn has(checks: &[Check], codes: &[&str]) -> bool {
+    checks.iter().flat_map(|check| &check.findings).any(|finding| codes.contains(&finding.code))
 }
 
 /// Places that the findings of the named checks are about.

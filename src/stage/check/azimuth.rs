@@ -22,6 +22,9 @@ use crate::texel::stereo::Stereo;
 /// Name of the check.
 pub const NAME: &str = "azimuth";
 
+/// Codes of findings that light and view azimuths contradict each other.
+pub const APART: [&str; 3] = ["view-azimuth-mirrored", "light-azimuth-mirrored", "azimuths-disagree"];
+
 /// Least side of the plane, texels.
 const LEAST_SIDE: usize = 24;
 
@@ -346,17 +349,17 @@ fn apart(lights: Reading, views: ViewReading) -> (&'static str, String, Option<&
     let exact = |option| (views.quarter == 0).then_some(option);
     match (lights, views.mirrored) {
         (Reading::AsGiven, true) => (
-            "view-azimuth-mirrored",
+            APART[0],
             "the views' azimuth runs clockwise, the lights' does not".to_owned(),
             exact("--azimuth mirrored-views"),
         ),
         (Reading::Mirrored, false) => (
-            "light-azimuth-mirrored",
+            APART[1],
             "the lights' azimuth runs clockwise, the views' does not".to_owned(),
             exact("--azimuth mirrored-lights"),
         ),
         _ => (
-            "azimuths-disagree",
+            APART[2],
             format!(
                 "lights are to be read {}, views {}turned by {} degrees: their azimuths do not start at one side",
                 lights.name(),

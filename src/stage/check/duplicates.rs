@@ -23,7 +23,7 @@ const SAME_DEG: f64 = 0.5;
 const RECIPROCAL_DEG: f64 = 3.0;
 
 /// Root mean square difference of thumbnails, relative to their mean, below which images are one photograph.
-const NEARLY: f64 = 0.0015;
+const NEARLY: f64 = 0.002;
 
 /// Thumbnails with less contrast than this are too plain to be told apart.
 const PLAIN: f64 = 0.02;

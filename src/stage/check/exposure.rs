@@ -86,9 +86,9 @@ fn dense(near: &Neighbourhood, directions: usize) -> bool {
     directions >= LEAST_DIRECTIONS && near.spacing_rad.to_degrees() <= SPACING_DEG
 }
 
-/// By how much each image is brighter than both its neighbouring lights and its neighbouring views promise, the smaller
-/// of both, natural logarithm; 0 where they contradict each other. With one view or sparse ones the lights alone tell;
-/// nothing where those are sparse.
+/// By how much each image is brighter than its neighbouring lights promise and than its neighbouring views do, as far as
+/// images of like geometry are not as well: the smaller of both, natural logarithm, 0 where they contradict each other.
+/// With sparse views the lights alone tell; nothing where those are sparse too.
 pub(super) fn jumps(statistics: &Statistics) -> Option<Vec<f64>> {
     let (near_lights, near_views) =
         (Neighbourhood::new(&statistics.lights), Neighbourhood::new(&statistics.views));
@@ -101,16 +101,18 @@ pub(super) fn jumps(statistics: &Statistics) -> Option<Vec<f64>> {
         return Some(by_light);
     }
     let by_view = levels.residuals(&near_views, false);
-    let smaller = |(&a, &b): (&f64, &f64)| {
-        if a * b <= 0.0 {
-            0.0
-        } else if a.abs() < b.abs() {
-            a
-        } else {
-            b
-        }
-    };
-    Some(by_light.iter().zip(&by_view).map(smaller).collect())
+    let alike = Alike::new(&statistics.views, &statistics.lights);
+    let [by_light, by_view] = [by_light, by_view].map(|residuals| alike.contrast(&residuals));
+    Some(by_light.iter().zip(&by_view).map(|(a, b)| smaller(a.0, b.0)).collect())
+}
+
+/// The smaller of two numbers of one sign, else 0.
+fn smaller(a: f64, b: f64) -> f64 {
+    match a * b > 0.0 {
+        false => 0.0,
+        true if a.abs() < b.abs() => a,
+        true => b,
+    }
 }
 
 /// Looks for jumps; images in `explained` have other faults and are left out.
@@ -202,10 +204,10 @@ fn images(
     let mut worst: f64 = 0.0;
     let mut found = Vec::new();
     for (at, (&(a, spread_a), &(b, spread_b))) in by_light.iter().zip(&by_view).enumerate() {
-        if skip(at) || a * b <= 0.0 {
+        let jump = smaller(a, b);
+        if skip(at) || jump == 0.0 {
             continue;
         }
-        let jump = if a.abs() < b.abs() { a } else { b };
         let times = (a.abs() / spread_a.max(FLOOR)).min(b.abs() / spread_b.max(FLOOR));
         let mut share = (jump.abs() / IMAGE_JUMP).min(times / IMAGE_TIMES);
         let (view, light) = (at / levels.lights, at % levels.lights);

@@ -72,7 +72,7 @@ impl Panel {
     }
 
     fn height(&self) -> usize {
-        2 * MARGIN + self.picture.size.height + (self.below.len() + 2) * LINE
+        MARGIN + self.picture.size.height + (self.below.len() + 3) * LINE
     }
 
     fn draw(&self, canvas: &mut Canvas, top: usize, left: usize) {
@@ -189,7 +189,7 @@ fn outliers(statistics: &Statistics, findings: &[&Finding]) -> Panel {
     }
     let (picture, factor) = map(statistics, colors);
     let what = if jumps.is_some() {
-        "Outliers: brightness over what neighbours promise"
+        "Outliers: brightness over neighbours and images alike"
     } else {
         "Outliers (directions too sparse for jumps)"
     };
@@ -227,7 +227,7 @@ fn frontal(statistics: &Statistics) -> (Panel, Panel) {
         Panel::plain("Frontal view, mean over lights", vec![name], grey.magnified(factor)),
         Panel::plain(
             "Normals as the directions are given",
-            vec![told, "should look lit from one side: bumps red right, green top".to_owned()],
+            vec![told, "bumps should be red at their right, green at their top".to_owned()],
             normals.magnified(factor),
         ),
     )

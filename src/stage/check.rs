@@ -60,21 +60,27 @@ pub fn examine(statistics: &Statistics) -> Report {
     let mut checks =
         vec![samples::numbers(statistics), samples::black(statistics), samples::saturation(statistics)];
     checks.push(duplicates::check(statistics));
+    let put_off = |names: &[&'static str], reason: &str| -> Vec<Check> {
+        names.iter().map(|name| Check::not_checked(name, format!("{reason}: repair that first"))).collect()
+    };
+    if has_fault(&checks, samples::SATURATION) {
+        checks.push(azimuth::check(statistics));
+        let names = [radiometry::NAME, misplaced::NAME, exposure::NAME];
+        checks.extend(put_off(&names, "clipping flattens the images"));
+        checks.push(registration::check(statistics));
+        return Report { checks };
+    }
     checks.push(radiometry::check(statistics));
-    if has(&checks, &[radiometry::SWAPPED]) {
+    if has_fault(&checks, radiometry::NAME) {
         let names = [azimuth::NAME, misplaced::NAME, exposure::NAME, registration::NAME];
-        checks.extend(
-            names.map(|name| Check::not_checked(name, "light and view are exchanged: repair that first")),
-        );
+        checks.extend(put_off(&names, "samples are not the light they are said to be"));
         return Report { checks };
     }
     checks.push(azimuth::check(statistics));
-    if has(&checks, &azimuth::APART) {
+    if checks.iter().flat_map(|check| &check.findings).any(|finding| azimuth::APART.contains(&finding.code)) {
         // Which images are alike depends on the azimuth between light and view.
         let names = [misplaced::NAME, exposure::NAME];
-        checks.extend(names.map(|name| {
-            Check::not_checked(name, "azimuths of light and view contradict: repair that first")
-        }));
+        checks.extend(put_off(&names, "azimuths of light and view contradict each other"));
         checks.push(registration::check(statistics));
         return Report { checks };
     }
@@ -87,9 +93,10 @@ pub fn examine(statistics: &Statistics) -> Report {
     Report { checks }
 }
 
-/// Whether there is a finding of one of these codes.
-fn has(checks: &[Check], codes: &[&str]) -> bool {
-    checks.iter().flat_map(|check| &check.findings).any(|finding| codes.contains(&finding.code))
+/// Whether the check of this name has found a fault.
+fn has_fault(checks: &[Check], name: &str) -> bool {
+    let of_name = checks.iter().filter(|check| check.name == name);
+    of_name.flat_map(|check| &check.findings).any(|finding| finding.severity == Severity::Fault)
 }
 
 /// Places that the findings of the named checks are about.

@@ -40,6 +40,9 @@ const INTEGRABLE: f64 = 0.35;
 /// Another reading is the right one if it leaves so many times less curl.
 const BETTER: f64 = 1.6;
 
+/// Share of curl up to which the height is known well enough to tell what it displaces.
+const KNOWN: f64 = 0.1;
+
 /// Views between these elevations show parallax without hiding too much, degrees.
 const PARALLAX_DEG: (f64, f64) = (10.0, 62.0);
 
@@ -222,6 +225,10 @@ fn surface(statistics: &Statistics) -> Result<Surface, String> {
 
 /// Reads the views against the surface that the lights show.
 fn views(statistics: &Statistics, surface: &Surface, lights: Reading) -> Result<ViewReading, String> {
+    let curl = surface.curl.iter().copied().fold(f64::INFINITY, f64::min);
+    if curl > KNOWN {
+        return Err(format!("with a curl of {curl:.2} the height is not known well enough"));
+    }
     let (p, q) = lights.slopes(&surface.p, &surface.q);
     let height = height_of_slopes(&p, &q).details(12);
     let picture = |view: usize| {

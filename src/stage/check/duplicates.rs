@@ -28,6 +28,9 @@ const NEARLY: f64 = 0.002;
 /// Thumbnails with less contrast than this are too plain to be told apart.
 const PLAIN: f64 = 0.02;
 
+/// Images of which more is clipped may be equal for that.
+const CLIPPED: f64 = 0.5;
+
 /// An image, what it is compared by, and its directions.
 struct Candidate<'a> {
     place: (usize, usize),
@@ -43,7 +46,9 @@ pub fn check(statistics: &Statistics) -> Check {
     let lights = statistics.lights.len();
     let mut candidates: Vec<Candidate<'_>> = (0..statistics.images.len())
         .map(|at| (at / lights, at % lights))
-        .filter(|&(view, light)| !statistics.is_black(view, light))
+        .filter(|&(view, light)| {
+            !statistics.is_black(view, light) && statistics.clipped_share(view, light) < CLIPPED
+        })
         .map(|(view, light)| {
             let image = statistics.image(view, light);
             Candidate {

@@ -22,9 +22,6 @@ use crate::texel::direction::Direction;
 /// Name of the check.
 pub const NAME: &str = "radiometry";
 
-/// Code of the finding that makes others pointless.
-pub const SWAPPED: &str = "light-view-swapped";
-
 /// A light this near to a view has its direction; else its neighbours are interpolated.
 const SAME_DEG: f64 = 1.5;
 
@@ -173,7 +170,7 @@ fn finding(statistics: &Statistics, exponents: &Exponents) -> Finding {
     let sure = confidence(off / TOLERANCE);
     let (code, severity, message, repair) = if k < EXCHANGED {
         (
-            SWAPPED,
+            "light-view-swapped",
             Severity::Fault,
             "images darken with the angle of what is called the view, as they should with the light's: light and view \
              are exchanged"

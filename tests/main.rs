@@ -5,6 +5,8 @@
 mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
+#[path = "behaviour/check.rs"]
+mod check;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
 #[path = "behaviour/equations.rs"]

@@ -1,6 +1,7 @@
 //! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
 
 mod analyse;
+mod check;
 mod demo;
 mod enlarge;
 mod export;
@@ -76,6 +77,7 @@ enum Command {
     Demo(demo::Demo),
     Sample(sample::Sample),
     Info(info::Info),
+    Check(check::Check),
     Import(import::Import),
     Verify(verify::Verify),
     Export(export::Export),
@@ -129,6 +131,7 @@ impl Command {
             Self::Demo(command) => command.run(context, tell),
             Self::Sample(command) => command.run(context, tell),
             Self::Info(command) => command.run(context, tell),
+            Self::Check(command) => command.run(context, tell),
             Self::Import(command) => command.run(context, tell),
             Self::Verify(command) => command.run(context, tell),
             Self::Export(command) => command.run(context, tell),

@@ -1,0 +1,185 @@
+//! One photograph under two names.
+//!
+//! Two photographs never have the same samples: the sensor's noise sees to that. Nearly the same thumbnails mean one
+//! photograph stored twice with another compression, but images with light and view exchanged may come near to it on a
+//! flat material (reciprocity), so that they are not looked at.
+
+use std::collections::HashMap;
+
+use serde_json::json;
+
+use super::angular::angle;
+use super::finding::{Check, Finding, Place, Severity, confidence, names, round};
+use super::statistics::Statistics;
+use btfkit_formats::Direction;
+
+/// Name of the check.
+pub const NAME: &str = "duplicate-images";
+
+/// Directions nearer than this are one direction, degrees.
+const SAME_DEG: f64 = 0.5;
+
+/// Pairs of directions that are nearly each other's exchange, degrees.
+const RECIPROCAL_DEG: f64 = 3.0;
+
+/// Root mean square difference of thumbnails, relative to their mean, below which images are one photograph.
+const NEARLY: f64 = 0.002;
+
+/// Thumbnails with less contrast than this are too plain to be told apart.
+const PLAIN: f64 = 0.02;
+
+/// Images of which more is clipped may be equal for that.
+const CLIPPED: f64 = 0.5;
+
+/// An image, what it is compared by, and its directions.
+struct Candidate<'a> {
+    place: (usize, usize),
+    view: Direction,
+    light: Direction,
+    hash: u64,
+    mean: f64,
+    thumbnail: &'a [f32],
+}
+
+/// Looks for equal and nearly equal images of different directions.
+pub fn check(statistics: &Statistics) -> Check {
+    let lights = statistics.lights.len();
+    let mut candidates: Vec<Candidate<'_>> = (0..statistics.images.len())
+        .map(|at| (at / lights, at % lights))
+        .filter(|&(view, light)| {
+            !statistics.is_black(view, light) && statistics.clipped_share(view, light) < CLIPPED
+        })
+        .map(|(view, light)| {
+            let image = statistics.image(view, light);
+            Candidate {
+                place: (view, light),
+                view: statistics.views[view],
+                light: statistics.lights[light],
+                hash: image.hash,
+                mean: image.thumbnail.iter().map(|&v| f64::from(v)).sum::<f64>()
+                    / image.thumbnail.len().max(1) as f64,
+                thumbnail: &image.thumbnail,
+            }
+        })
+        .collect();
+    let equal = equal(&candidates);
+    candidates.sort_by(|a, b| a.mean.total_cmp(&b.mean));
+    let (least, near) = nearly_equal(&candidates);
+    let near: Vec<_> = near
+        .into_iter()
+        .filter(|pair| !equal.iter().any(|group| group.contains(&pair.0) && group.contains(&pair.1)))
+        .collect();
+    let mut findings = Vec::new();
+    if !equal.is_empty() {
+        let places: Vec<Place> =
+            equal.iter().flatten().map(|&(view, light)| Place::image(view, light)).collect();
+        findings.push(Finding {
+            code: "duplicate-image",
+            severity: Severity::Fault,
+            confidence: 1.0,
+            message: format!(
+                "images of different directions are equal in every sample: {}",
+                names(&places, statistics)
+            ),
+            evidence: json!({"groups": equal}),
+            repair: None,
+            directions: places,
+        });
+    }
+    if !near.is_empty() {
+        let places: Vec<Place> = near
+            .iter()
+            .flat_map(|(a, b, _)| [a, b])
+            .map(|&(view, light)| Place::image(view, light))
+            .collect();
+        let pairs: Vec<_> =
+            near.iter().map(|(a, b, difference)| json!([a, b, round(*difference, 5)])).collect();
+        findings.push(Finding {
+            code: "nearly-duplicate-image",
+            severity: Severity::Suspicion,
+            confidence: confidence(NEARLY / least.max(1e-9)),
+            message: format!(
+                "images of different directions are nearly equal: {}",
+                names(&places, statistics)
+            ),
+            evidence: json!({"pairs": pairs, "threshold": NEARLY}),
+            repair: None,
+            directions: places,
+        });
+    }
+    let least_percent = 100.0 * least;
+    let detail = format!(
+        "no two images are nearer than {least_percent:.2} %, nearly equal below {:.2} %",
+        100.0 * NEARLY
+    );
+    Check::done(NAME, detail, NEARLY / least.max(1e-9), findings)
+}
+
+/// Groups of images with the same samples under different directions.
+fn equal(candidates: &[Candidate<'_>]) -> Vec<Vec<(usize, usize)>> {
+    let mut by_hash: HashMap<u64, Vec<&Candidate<'_>>> = HashMap::new();
+    for candidate in candidates {
+        by_hash.entry(candidate.hash).or_default().push(candidate);
+    }
+    let mut groups: Vec<Vec<(usize, usize)>> = by_hash
+        .into_values()
+        .filter(|group| group.iter().any(|other| !same(group[0], other)))
+        .map(|group| group.iter().map(|candidate| candidate.place).collect())
+        .collect();
+    groups.sort();
+    groups
+}
+
+fn same(a: &Candidate<'_>, b: &Candidate<'_>) -> bool {
+    let near = |a, b| angle(a, b) < SAME_DEG.to_radians();
+    near(a.view, b.view) && near(a.light, b.light)
+}
+
+fn reciprocal(a: &Candidate<'_>, b: &Candidate<'_>) -> bool {
+    let near = |a, b| angle(a, b) < RECIPROCAL_DEG.to_radians();
+    near(a.view, b.light) && near(a.light, b.view)
+}
+
+/// Two images and their difference.
+type Pair = ((usize, usize), (usize, usize), f64);
+
+/// The least difference of two images, and those below the threshold. Sorted by mean, few need comparing.
+fn nearly_equal(candidates: &[Candidate<'_>]) -> (f64, Vec<Pair>) {
+    /// Means of pairs that are compared, relative to each other: beyond it the least difference is not exact.
+    const REACH: f64 = 10.0 * NEARLY;
+    let mut least = REACH;
+    let mut found = Vec::new();
+    for (number, a) in candidates.iter().enumerate() {
+        if contrast(a.thumbnail, a.mean) < PLAIN {
+            continue;
+        }
+        for b in candidates[number + 1..].iter().take_while(|b| b.mean <= a.mean * (1.0 + REACH)) {
+            let difference = difference(a.thumbnail, b.thumbnail, a.mean * REACH) / a.mean;
+            if difference < least.max(NEARLY) && !same(a, b) && !reciprocal(a, b) {
+                least = least.min(difference);
+                if difference < NEARLY {
+                    found.push((a.place, b.place, difference));
+                }
+            }
+        }
+    }
+    (least, found)
+}
+
+fn contrast(thumbnail: &[f32], mean: f64) -> f64 {
+    let square: f64 = thumbnail.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum();
+    (square / thumbnail.len().max(1) as f64).sqrt() / mean.max(f64::MIN_POSITIVE)
+}
+
+/// Root mean square difference, infinite where it is beyond `bound`.
+fn difference(a: &[f32], b: &[f32], bound: f64) -> f64 {
+    let enough = bound * bound * a.len() as f64;
+    let mut sum = 0.0;
+    for (a, b) in a.chunks(16).zip(b.chunks(16)) {
+        sum += a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+        if sum > enough {
+            return f64::INFINITY;
+        }
+    }
+    (sum / a.len().max(1) as f64).sqrt()
+}

@@ -1,0 +1,150 @@
+//! What a diagnosis says.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::statistics::Statistics;
+
+/// How bad a finding is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing.
+    Note,
+    /// Something may be wrong; a person should look.
+    Suspicion,
+    /// The data are wrong, or not what they are said to be.
+    Fault,
+}
+
+/// The image, or all images of a view or a light, that a finding is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct Place {
+    /// Number of the view; all views if there is none.
+    pub view: Option<usize>,
+    /// Number of the light; all lights if there is none.
+    pub light: Option<usize>,
+}
+
+impl Place {
+    /// One image.
+    pub fn image(view: usize, light: usize) -> Self {
+        Self { view: Some(view), light: Some(light) }
+    }
+
+    /// All images of a view.
+    pub fn view(view: usize) -> Self {
+        Self { view: Some(view), light: None }
+    }
+
+    /// All images of a light.
+    pub fn light(light: usize) -> Self {
+        Self { view: None, light: Some(light) }
+    }
+
+    /// With its angles in degrees, for people.
+    pub(super) fn named(self, statistics: &Statistics) -> String {
+        let angles = |direction: btfkit_formats::Direction| {
+            let (theta, phi) = direction.degrees();
+            format!("({}, {})", round(theta, 1), round(phi, 1))
+        };
+        let view = self.view.map(|view| format!("view {view} {}", angles(statistics.views[view])));
+        let light = self.light.map(|light| format!("light {light} {}", angles(statistics.lights[light])));
+        [view, light].into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// Something found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// What it is, in kebab case.
+    pub code: &'static str,
+    /// How bad it is.
+    pub severity: Severity,
+    /// How sure the finding is, 0..1: how far beyond its threshold the evidence lies.
+    pub confidence: f64,
+    /// For people.
+    pub message: String,
+    /// The numbers behind it.
+    pub evidence: Value,
+    /// The option of `btf import` that repairs it, if there is one.
+    pub repair: Option<String>,
+    /// Where.
+    pub directions: Vec<Place>,
+}
+
+/// One question asked of the data and its answer.
+#[derive(Clone, Debug, Serialize)]
+pub struct Check {
+    /// Which, in kebab case.
+    pub name: &'static str,
+    /// How it ended.
+    pub state: State,
+    /// What was measured, or why nothing was.
+    pub detail: String,
+    /// The worst value measured as a share of the one that raises the alarm.
+    pub alarm: Option<f64>,
+    /// What was found.
+    pub findings: Vec<Finding>,
+}
+
+/// How a check ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum State {
+    /// Nothing was found.
+    Ok,
+    /// Something was.
+    Finding,
+    /// The data do not tell.
+    NotChecked,
+}
+
+impl Check {
+    /// What was measured, and what was found in it.
+    pub(super) fn done(
+        name: &'static str,
+        detail: impl Into<String>,
+        alarm: f64,
+        findings: Vec<Finding>,
+    ) -> Self {
+        let state = if findings.is_empty() { State::Ok } else { State::Finding };
+        Self { name, state, detail: detail.into(), alarm: Some(round(alarm.abs(), 3)), findings }
+    }
+
+    /// Why the data do not tell.
+    pub(super) fn not_checked(name: &'static str, reason: impl Into<String>) -> Self {
+        Self { name, state: State::NotChecked, detail: reason.into(), alarm: None, findings: Vec::new() }
+    }
+}
+
+/// Confidence of evidence that is `times` its threshold: 1/2 at it, towards 1 far beyond.
+pub(super) fn confidence(times: f64) -> f64 {
+    round(1.0 - 0.5 / times.max(0.5), 3)
+}
+
+/// A number with few decimals, for evidence.
+pub(super) fn round(value: f64, decimals: i32) -> f64 {
+    let unit = 10f64.powi(decimals);
+    (value * unit).round() / unit
+}
+
+/// The names of places, the first few of them.
+pub(super) fn names(places: &[Place], statistics: &Statistics) -> String {
+    const NAMED: usize = 6;
+    let mut names: Vec<String> = places.iter().take(NAMED).map(|place| place.named(statistics)).collect();
+    if places.len() > NAMED {
+        names.push(format!("and {} more", places.len() - NAMED));
+    }
+    names.join("; ")
+}
+
+/// Places and a number of each, as evidence.
+pub(super) fn listed(places: &[(Place, f64)]) -> Value {
+    const LISTED: usize = 100;
+    places
+        .iter()
+        .take(LISTED)
+        .map(|(place, value)| json!({"view": place.view, "light": place.light, "value": round(*value, 4)}))
+        .collect()
+}

@@ -67,7 +67,7 @@ def decode(data, shape, dtype, channel_axis):
         stream = data[at : at + length]
         at += length
         # Into a buffer of the right length, so that no header makes it larger.
-        plane = np.frombuffer(stream, np.uint8) if length == count else np.empty(count, np.uint8)
+        plane = np.frombuffer(stream, np.uint8) if length == count else np.zeros(count, np.uint8)
         if length != count:
             Zstd().decode(stream, out=plane)
         planes.append(plane)

@@ -31,8 +31,7 @@ pub fn scaled(samples: &Samples, range: Range<usize>) -> Vec<f32> {
 pub fn linear(samples: &Samples, range: Range<usize>, transfer: Transfer) -> Vec<f32> {
     match (samples, transfer) {
         (Samples::U8(list), _) => {
-            let table: [f32; 256] =
-                std::array::from_fn(|code| transfer.decode(code as f64 / 255.0) as f32);
+            let table: [f32; 256] = std::array::from_fn(|code| transfer.decode(code as f64 / 255.0) as f32);
             list[range].iter().map(|&s| table[usize::from(s)]).collect()
         }
         (_, Transfer::Linear) => scaled(samples, range),

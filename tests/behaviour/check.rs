@@ -209,7 +209,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
     let (view, light) = (n_views / 3, n_lights / 2);
     let (other_view, other_light) = (n_views / 2, n_lights / 5);
     let lights = base.description.lights.clone();
-    let mirror = |directions: &mut Vec<btfkit::texel::direction::Direction>| {
+    let mirror = |directions: &mut Vec<btfkit_formats::Direction>| {
         directions.iter_mut().for_each(|direction| direction.phi_rad = -direction.phi_rad);
     };
     let case = |name, source, code, repair, places| Case { name, source, code, repair, places };

@@ -7,8 +7,8 @@ use super::finding::{Finding, round};
 use super::statistics::Statistics;
 use crate::picture::{Picture, false_color};
 use crate::shape::Size;
-use btfkit_formats::Direction;
 use crate::texel::stereo::Stereo;
+use btfkit_formats::Direction;
 
 /// Side that each panel is magnified to or towards, pixels.
 const PANEL: usize = 440;

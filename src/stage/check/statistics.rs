@@ -8,8 +8,8 @@ use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
 use crate::store::measurement::Description;
-use btfkit_formats::Direction;
 use crate::views::{Views, linear, scaled};
+use btfkit_formats::Direction;
 
 /// Side of the window in the middle of the plane that is looked at texel by texel.
 const WINDOW_SIDE: usize = 192;

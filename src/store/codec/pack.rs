@@ -22,7 +22,8 @@ pub const MOST_CHANNELS: usize = 4096;
 
 /// Encodes and decodes chunks of one kind; what one thread needs for it is kept from chunk to chunk.
 ///
-/// The bytes are those that the codecs of [`super::chunk_codecs`] give.
+/// The codecs of [`super::chunk_codecs`] read its bytes, and it reads theirs; but for zstd's parameters on differences
+/// the bytes are the same.
 pub struct ChunkCodec {
     chunk: Chunk,
     work: Work,

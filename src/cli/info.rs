@@ -101,7 +101,10 @@ impl Info {
         rows.extend(described(description));
         rows.push(row!["white", description.white]);
         rows.push(row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())]);
-        rows.extend(measurement.assumptions().iter().map(|assumption| row!["assumed", assumption]));
+        let attributes = measurement.attributes()?;
+        let assumptions = attributes.get("assumptions").and_then(Value::as_array);
+        let texts = assumptions.into_iter().flatten().filter_map(Value::as_str);
+        rows.extend(texts.map(|assumption| row!["assumed", assumption]));
         Ok(rows)
     }
 

@@ -1,7 +1,6 @@
 //! One HDF5 file with the arrays and attributes of the store.
 
 use btfkit_formats::Contents;
-use serde_json::{Map, Value, json};
 
 use super::Options;
 use crate::color::Transfer;
@@ -30,12 +29,7 @@ pub(super) fn write(
         assumptions: Vec::new(),
         remarks: Vec::new(),
     };
-    let attributes = Map::from_iter([
-        ("white".to_owned(), json!(description.white)),
-        ("version".to_owned(), Value::from(env!("CARGO_PKG_VERSION"))),
-        ("digest".to_owned(), Value::from(measurement.digest())),
-    ]);
-    let mut writer = Writer::create(&options.output, &contents, &attributes)?;
+    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?;
     let whole = description.size.window();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     for view in 0..description.views.len() {

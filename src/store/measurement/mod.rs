@@ -158,13 +158,9 @@ impl Measurement {
         &self.digest
     }
 
-    /// What its import had to assume because the archive does not say it.
-    pub fn assumptions(&self) -> Vec<String> {
-        let found = self.store.attributes().ok().flatten().unwrap_or_default();
-        found
-            .get("assumptions")
-            .and_then(|list| serde_json::from_value(list.clone()).ok())
-            .unwrap_or_default()
+    /// The attributes of its group: how samples are meant, what was assumed, the recipe.
+    pub fn attributes(&self) -> Result<Map<String, Value>> {
+        self.store.expect(KIND)
     }
 
     /// Where it lies.

@@ -1,8 +1,8 @@
 """A measurement store as one array of numpy, [view, light, y, x, channel].
 
-    array.py ARRAY.npy STORE             compares an exported array and its directions; exit code 1 where they disagree
-    array.py --linear OUT.npy STORE      writes the samples as linear f32, for judges of other exports
-    array.py --display OUT.npy STORE     writes them as f32 with the transfer curve, 1.0 is display white
+    numpy_array.py ARRAY.npy STORE             compares an exported array and its directions; exit code 1 where they disagree
+    numpy_array.py --linear OUT.npy STORE      writes the samples as linear f32, for judges of other exports
+    numpy_array.py --display OUT.npy STORE     writes them as f32 with the transfer curve, 1.0 is display white
 
 Needs numpy and zarr.
 """

@@ -22,7 +22,8 @@ fn main() {
     let shard: Shard = arguments.get(1).map_or(Shard::WHOLE, |text| text.parse().unwrap());
     let bytes = btfkit::store::mapped::MappedFile::open(archive.as_ref()).unwrap();
     let index = ZipIndex::open(bytes.as_ref(), &Limits::default()).unwrap();
-    let catalogue = Catalogue::from_names(index.entries().iter().map(|entry| entry.name())).unwrap();
+    let catalogue =
+        Catalogue::from_names(index.entries().iter().map(btfkit_formats::zip::ZipEntry::name)).unwrap();
     let (mut images, mut pixels, mut encoded) = (0, 0u64, 0u64);
     let start = cpu_seconds();
     for view in (0..catalogue.views().len()).filter(|&view| shard.has(view)) {

@@ -114,7 +114,8 @@ fn directions_beside(path: &Path, options: &Options, limits: &Limits) -> Result<
         let published = directions::published(name).ok_or_else(|| {
             Error::new(crate::Kind::Usage, format!("got the list {name:?}, expected ubo81 or bonn151"))
         })?;
-        let published: Vec<Direction> = published.into_iter().map(|angles| angles.direction()).collect();
+        let published: Vec<Direction> =
+            published.into_iter().map(btfkit_formats::Angles::direction).collect();
         beside.lights.get_or_insert_with(|| published.clone());
         beside.views.get_or_insert(published);
     }

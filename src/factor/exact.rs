@@ -55,6 +55,7 @@ pub fn full_rank(size: Size, mut source: impl FnMut(&mut Visit<'_>) -> Result<()
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

@@ -144,6 +144,7 @@ fn orthonormal(transposed: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::error::Kind;
 
@@ -200,7 +201,7 @@ mod tests {
             let rank = 4;
             let matrix = whole_numbers(rows, rank, 1) * whole_numbers(rank, columns, 2);
             let factors = factors(&matrix, rank, &Options::default());
-            assert!(error(&matrix, &factors) < 1e-11 * matrix.norm() as f64, "{rows} x {columns}");
+            assert!(error(&matrix, &factors) < 1e-11 * f64::from(matrix.norm()), "{rows} x {columns}");
             let directions = DMatrix::from_row_slice(rows, rank, &factors.directions);
             let gram = directions.transpose() * &directions;
             assert!((gram - DMatrix::identity(rank, rank)).norm() < 1e-12);

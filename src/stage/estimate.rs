@@ -32,5 +32,5 @@ pub fn store_bytes(source: &dyn Source, codec: Chain, context: &Context<'_>) -> 
         encoded += encoded_bytes(&description, codec, &codes, &images, window)?;
         chunks += 1;
     }
-    Ok((encoded as f64 / chunks.max(1) as f64 * (all * description.views.len()) as f64) as u64)
+    Ok((encoded as f64 / f64::from(chunks.max(1)) * (all * description.views.len()) as f64) as u64)
 }

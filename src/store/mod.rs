@@ -385,8 +385,8 @@ impl Store {
     }
 
     /// Writes a shard that is encoded already.
-    pub(crate) fn write_encoded(&self, array: &Array, indices: &[u64], bytes: Vec<u8>) -> Result<()> {
-        mapped::write_file(&self.chunk_path(array, indices), &bytes)
+    pub(crate) fn write_encoded(&self, array: &Array, indices: &[u64], bytes: &[u8]) -> Result<()> {
+        mapped::write_file(&self.chunk_path(array, indices), bytes)
     }
 
     /// The file of a chunk (or shard).

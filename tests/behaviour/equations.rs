@@ -92,7 +92,7 @@ fn the_store_holds_the_decoded_images() {
     let bytes = std::fs::read(fixture().archive()).unwrap();
     let limits = btfkit_formats::Limits::default();
     let index = btfkit_formats::zip::ZipIndex::open(&bytes, &limits).unwrap();
-    let names = index.entries().iter().map(|entry| entry.name());
+    let names = index.entries().iter().map(btfkit_formats::zip::ZipEntry::name);
     let catalogue = btfkit_formats::Catalogue::from_names(names).unwrap();
     let measurement = btfkit::store::measurement::Measurement::open(&fixture().measurement()).unwrap();
     let description = measurement.description();

@@ -137,7 +137,7 @@ impl ColorModel {
             }),
             ColorModel::LogYUv => each_triple(pixels, |[y, u, v]| rgb_from_yuv([unlog(y), u, v])),
             ColorModel::LogYLogULogV => {
-                each_triple(pixels, |[y, u, v]| rgb_from_yuv([unlog(y), unlog_signed(u), unlog_signed(v)]))
+                each_triple(pixels, |[y, u, v]| rgb_from_yuv([unlog(y), unlog_signed(u), unlog_signed(v)]));
             }
             ColorModel::LogYRatios => each_triple(pixels, |[y, u, v]| {
                 let scale = libm::expf(y);

@@ -271,7 +271,7 @@ impl Btf {
 }
 
 fn quarter(hash: usize) -> f64 {
-    ((hash * 2_654_435_761) >> 7) as u8 as f64 % 9.0 / 4.0 - 1.0
+    f64::from(((hash * 2_654_435_761) >> 7) as u8) % 9.0 / 4.0 - 1.0
 }
 
 fn put_product(out: &mut Vec<u8>, size: u8, rank: usize, transposed: bool, a: Vec<f64>, b: Vec<f64>) {

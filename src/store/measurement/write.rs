@@ -47,9 +47,9 @@ impl Measurement {
             }
             let place = [view as u64, sy, sx, 0, 0];
             // Luminance last: a view counts as done when it has both.
-            self.store.write_encoded(&self.reflectance, &place, shard::assemble(&reflectance))?;
+            self.store.write_encoded(&self.reflectance, &place, &shard::assemble(&reflectance))?;
             drop(reflectance);
-            self.store.write_encoded(&self.luminance, &place[..4], shard::assemble(&luminance))?;
+            self.store.write_encoded(&self.luminance, &place[..4], &shard::assemble(&luminance))?;
         }
         Ok(found)
     }

@@ -66,9 +66,9 @@ impl Files {
             return Ok(());
         }
         let file = MappedFile::open(&path).map_err(|error| Error::io("read", &path, error))?;
-        let index = ZipIndex::open(file.as_ref(), limits)
+        let index = ZipIndex::open_mapped(file.as_ref(), limits, &mut |range| file.release(range))
             .map_err(|error| Error::from(error).context(path.display()))?;
-        // Listing has touched a header beside every image.
+        // The directory at the end.
         file.release(0..file.as_ref().len());
         let zip = self.zips.len();
         for (entry, listed) in index.entries().iter().enumerate() {

@@ -77,6 +77,21 @@ impl ZipIndex {
     /// - [`ErrorKind::Unsupported`]: an encrypted entry, or a method other than stored and deflate.
     /// - [`ErrorKind::Limit`]: more entries, or a larger one, than `limits` allows.
     pub fn open(bytes: &[u8], limits: &Limits) -> Result<ZipIndex> {
+        ZipIndex::open_mapped(bytes, limits, &mut |_| ())
+    }
+
+    /// The same for a memory map: `looked_at` is told of every range of an entry's header and data whose header
+    /// has been looked at, so that its pages can be given back. A header lies beside every image, and so listing
+    /// would else bring a good part of an archive into memory.
+    ///
+    /// # Errors
+    ///
+    /// As [`ZipIndex::open`].
+    pub fn open_mapped(
+        bytes: &[u8],
+        limits: &Limits,
+        looked_at: &mut dyn FnMut(Range<usize>),
+    ) -> Result<ZipIndex> {
         let archive = ZipArchive::from_slice(bytes)
             .map_err(|e| translate(e, "a zip archive with its directory at the end"))?;
         let declared = archive.entries_hint();
@@ -91,7 +106,10 @@ impl ZipIndex {
                 return Err(Error::new(ErrorKind::Limit, format!("{count} zip entries or more"), expected));
             }
             if !record.is_dir() {
-                entries.push(read_entry(&archive, &record, limits)?);
+                let entry = read_entry(&archive, &record, limits)?;
+                let start = usize::try_from(record.local_header_offset()).unwrap_or(entry.compressed.start);
+                looked_at(start..entry.compressed.end);
+                entries.push(entry);
             }
         }
         if count != declared {

@@ -39,13 +39,14 @@ impl Check {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         self.picture.as_deref().map(Ending::of).transpose()?;
         let path = self.paths.first().map_or(Path::new(""), PathBuf::as_path);
-        let (statistics, report) = if path.join("zarr.json").exists() {
-            check::run(&open(path)?, context)?
-        } else {
-            let source = self.source.open(&self.paths)?;
-            let description = import::describe(source.as_ref(), 1.0);
-            check::run(&ArchiveViews::new(source.as_ref(), description), context)?
-        };
+        let (statistics, report) =
+            if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
+                check::run(&open(path)?, context)?
+            } else {
+                let source = self.source.open(&self.paths)?;
+                let description = import::describe(source.as_ref(), 1.0);
+                check::run(&ArchiveViews::new(source.as_ref(), description), context)?
+            };
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
             tell.plan(&value)?;

@@ -79,14 +79,16 @@ impl Photographs {
     }
 }
 
+/// What becomes of the samples, 0..1, of the image of a view and a light.
+type Alteration<'a> = Box<dyn Fn(usize, usize, &mut [f32]) + Sync + 'a>;
+
 /// Photographs with something done to them.
 struct Altered<'a> {
     base: &'a Photographs,
     description: Description,
     /// Which image is found under a view and a light.
     from: Box<dyn Fn(usize, usize) -> (usize, usize) + Sync + 'a>,
-    /// What has become of its samples, 0..1.
-    alter: Box<dyn Fn(usize, usize, &mut Vec<f32>) + Sync + 'a>,
+    alter: Alteration<'a>,
     float: bool,
 }
 
@@ -99,7 +101,7 @@ impl<'a> Altered<'a> {
         self.from = Box::new(from);
         self
     }
-    fn altered(mut self, alter: impl Fn(usize, usize, &mut Vec<f32>) + Sync + 'a) -> Self {
+    fn altered(mut self, alter: impl Fn(usize, usize, &mut [f32]) + Sync + 'a) -> Self {
         self.alter = Box::new(alter);
         self
     }
@@ -115,7 +117,7 @@ impl<'a> Altered<'a> {
     fn lit(self, factor: impl Fn(usize, usize) -> f64 + Sync + 'a) -> Self {
         self.curved(move |view, light, s| srgb_encode(factor(view, light) * srgb_decode(s)))
     }
-    fn as_float(mut self) -> Self {
+    fn in_floats(mut self) -> Self {
         self.float = true;
         self
     }
@@ -164,8 +166,8 @@ fn state(report: &Report, name: &str) -> State {
 }
 
 /// Rows and columns of a square image exchanged.
-fn transpose(image: &mut Vec<f32>, side: usize) {
-    let old = image.clone();
+fn transpose(image: &mut [f32], side: usize) {
+    let old = image.to_vec();
     let channels = old.len() / (side * side);
     for (n, sample) in image.chunks_exact_mut(channels).enumerate() {
         let from = (n % side * side + n / side) * channels;
@@ -174,8 +176,8 @@ fn transpose(image: &mut Vec<f32>, side: usize) {
 }
 
 /// An image moved by rows and columns, what leaves it coming in at the other side.
-fn shift(image: &mut Vec<f32>, size: Size, down: usize, right: usize) {
-    let old = image.clone();
+fn shift(image: &mut [f32], size: Size, down: usize, right: usize) {
+    let old = image.to_vec();
     let channels = old.len() / size.texels();
     for (n, sample) in image.chunks_exact_mut(channels).enumerate() {
         let y = (n / size.width + size.height - down) % size.height;
@@ -322,9 +324,12 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
                 move |v, l, image| {
                     if here(v, l) {
                         image.iter_mut().enumerate().for_each(|(n, s)| {
-                            // By turns up and down at a few texels, as another compression does.
-                            let noise =
-                                [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0][n / 3 % 12];
+                            // Up and down at a few texels, as another compression does.
+                            let noise = match (n / 3).wrapping_mul(2_654_435_761) >> 9 & 15 {
+                                0 => 1.0,
+                                1 => -1.0,
+                                _ => 0.0,
+                            };
                             *s = (*s + noise / 255.0).clamp(0.0, 1.0);
                         });
                     }
@@ -380,7 +385,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
         ),
         case(
             "NaN",
-            good().as_float().altered(move |v, l, image| {
+            good().in_floats().altered(move |v, l, image| {
                 if here(v, l) {
                     image[7] = f32::NAN;
                     image[8] = f32::INFINITY;
@@ -392,7 +397,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
         ),
         case(
             "negative samples",
-            good().as_float().curved(move |v, l, s| if here(v, l) { s - 0.2 } else { s }),
+            good().in_floats().curved(move |v, l, s| if here(v, l) { s - 0.2 } else { s }),
             "negative",
             None,
             image(),

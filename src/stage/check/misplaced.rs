@@ -43,7 +43,7 @@ const BETTER: f64 = 0.5;
 
 /// A single image that belongs elsewhere must fit there nearly perfectly, and far better.
 const FIT_ALONE: f64 = 0.93;
-const BETTER_ALONE: f64 = 1.0;
+const BETTER_ALONE: f64 = 1.2;
 
 /// Patterns of all images, [view, light, cell].
 struct Patterns {

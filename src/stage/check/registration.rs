@@ -28,8 +28,9 @@ const NEIGHBOURS: usize = 5;
 const MOST: usize = 3;
 const AGREE: f64 = 1.0;
 
-/// Displacement that counts, texels ...
+/// Displacement that counts, texels; from this elevation on it grows with the tangent, as parallax does ...
 const DISPLACED: f64 = 1.4;
+const STEEP_DEG: f64 = 60.0;
 
 /// ... and this many times what views of about that elevation are displaced by ...
 const TIMES: f64 = 4.0;
@@ -41,7 +42,10 @@ const CORRELATION: f64 = 0.6;
 const GAIN: f64 = 0.05;
 
 /// Fewer views do not tell which of them is wrong.
-const LEAST_VIEWS: usize = 5;
+const LEAST_VIEWS: usize = 12;
+
+/// Views farther apart than this differ by their parallax, degrees.
+const SPACING_DEG: f64 = 38.0;
 
 /// Views count as of about one elevation within this angle, degrees.
 const ELEVATION_DEG: f64 = 16.0;
@@ -63,8 +67,15 @@ impl Offset {
 /// Looks for displaced views.
 pub fn check(statistics: &Statistics) -> Check {
     let count = statistics.views.len();
-    if count < LEAST_VIEWS {
-        return Check::not_checked(NAME, format!("{count} views, expected at least {LEAST_VIEWS}"));
+    let near = Neighbourhood::new(&statistics.views);
+    let spacing_deg = near.spacing_rad.to_degrees();
+    if count < LEAST_VIEWS || spacing_deg > SPACING_DEG {
+        return Check::not_checked(
+            NAME,
+            format!(
+                "{count} views {spacing_deg:.0} degrees apart, expected at least {LEAST_VIEWS} within {SPACING_DEG}"
+            ),
+        );
     }
     if statistics.window.height.min(statistics.window.width) < LEAST_SIDE {
         return Check::not_checked(
@@ -80,7 +91,6 @@ pub fn check(statistics: &Statistics) -> Check {
             Plane::new(statistics.window, values).smoothed().details(6)
         })
         .collect();
-    let near = Neighbourhood::new(&statistics.views);
     let offsets: Vec<Option<Offset>> =
         (0..count).into_par_iter().map(|view| offset(&pictures, &near, view)).collect();
     let mut worst: f64 = 0.0;
@@ -101,7 +111,8 @@ pub fn check(statistics: &Statistics) -> Check {
                 .filter_map(|other| offsets[other].as_ref())
                 .map(Offset::length),
         );
-        let threshold = DISPLACED.max(TIMES * usual);
+        let parallax = statistics.views[view].theta_rad.tan() / STEEP_DEG.to_radians().tan();
+        let threshold = (DISPLACED * parallax.max(1.0)).max(TIMES * usual);
         let share = (offset.length() / threshold).min(offset.gain / GAIN);
         worst = worst.max(share);
         if share > 1.0 {

@@ -21,6 +21,9 @@ const MANY_NEGATIVE: f64 = 0.02;
 /// Share of all samples at the largest value that is suspicious, and that is a fault.
 const CLIPPED: (f64, f64) = (0.01, 0.04);
 
+/// Share of the images that must be clipped so: a few highlights may fill theirs.
+const CLIPPED_IMAGES: f64 = 0.1;
+
 /// Fewer equal largest samples of floats are no sign of clipping.
 const LEAST_CLIPPED: u64 = 16;
 
@@ -126,7 +129,9 @@ pub fn saturation(statistics: &Statistics) -> Check {
         100.0 * share,
         100.0 * worst
     );
-    let alarm = share / CLIPPED.0;
+    let clipped = of_image.iter().filter(|(_, share)| *share > CLIPPED.0).count();
+    let clipped = clipped as f64 / statistics.images.len().max(1) as f64;
+    let alarm = (share / CLIPPED.0).min(clipped / CLIPPED_IMAGES);
     if alarm <= 1.0 || count < LEAST_CLIPPED as f64 {
         return Check::done(SATURATION, detail, alarm, Vec::new());
     }

@@ -293,7 +293,7 @@ impl<'a> Sums<'a> {
             stored.chunks_exact(lights * channels).zip(light.chunks_exact(lights)).enumerate()
         {
             let cell = cell_row + x * self.cells.width / width;
-            let tried = y % step_y == 0 && x % step_x == 0;
+            let tried = y.is_multiple_of(step_y) && x.is_multiple_of(step_x);
             self.tried += u64::from(tried);
             for ((image, sample), &light) in
                 self.images.iter_mut().zip(stored.chunks_exact(channels)).zip(light)

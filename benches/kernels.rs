@@ -9,8 +9,8 @@ use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
-use btfkit::texel::direction::Direction;
 use btfkit::texel::nearest::{NearestNormals, Neighbour};
+use btfkit_formats::{Direction, SampleType, Samples};
 use divan::counter::{BytesCount, ItemsCount};
 use divan::{Bencher, black_box};
 
@@ -111,11 +111,13 @@ fn deltas(bencher: Bencher<'_, '_>, kernel: predict::Kernel) {
 /// L* codes of 8-bit colours.
 #[divan::bench]
 fn lightness_codes(bencher: Bencher<'_, '_>) {
-    let codes = LightnessCodes::new(Transfer::Srgb, 3, 1.0);
-    let samples = bytes(3 << 16, 0);
-    bencher.counter(ItemsCount::new(1usize << 16)).bench(|| {
-        black_box(&samples).chunks_exact(3).map(|sample| u64::from(codes.code(sample).0)).sum::<u64>()
-    });
+    let channels = ["R", "G", "B"].map(str::to_owned);
+    let codes = LightnessCodes::new(Transfer::Srgb, SampleType::U8, &channels, 1.0).expect("known channels");
+    let samples = Samples::U8(bytes(3 << 16, 0));
+    let mut found = vec![0; 1 << 16];
+    bencher
+        .counter(ItemsCount::new(1usize << 16))
+        .bench_local(|| codes.fill(black_box(&samples), &mut found));
 }
 
 /// The 16 nearest of the normals of a 137 x 142 tile.

@@ -3,6 +3,8 @@
 //! A vector is cut into groups of equal weight, each padded to a multiple of [`LANE_BYTES`] by bytes
 //! that are equal in all vectors. All sums are exact, so every kernel gives the same result.
 
+pub use super::Kernel;
+
 /// Bytes to whose multiple groups are padded.
 pub const LANE_BYTES: usize = 64;
 
@@ -17,35 +19,7 @@ pub struct Group {
     pub end: usize,
 }
 
-/// A way to compute the sums, chosen once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
-    /// Portable Rust.
-    Plain,
-    /// AVX2, 32 bytes at a time.
-    #[cfg(target_arch = "x86_64")]
-    #[non_exhaustive] // so that only `available` can vouch for it
-    Avx2,
-}
-
 impl Kernel {
-    /// Every kernel that this machine can run, plain first, fastest last.
-    pub fn available() -> Vec<Self> {
-        #[allow(unused_mut)] // grows on x86 only
-        let mut kernels = vec![Self::Plain];
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            kernels.push(Self::Avx2);
-        }
-        kernels
-    }
-
-    /// The fastest of them; `BTFKIT_KERNEL=plain` lowers the choice, to corner a fault.
-    pub fn fastest() -> Self {
-        let lowered = std::env::var_os("BTFKIT_KERNEL").is_some_and(|name| name == "plain");
-        if lowered { Self::Plain } else { Self::available().last().copied().unwrap_or(Self::Plain) }
-    }
-
     /// Distances of `points` [m, stride] to `centres` [k, stride], written to `distances` [m, k].
     pub fn distances(
         self,

@@ -1,6 +1,5 @@
 //! The doctor finds each fault that is put into good data, that fault only, and nothing in good data.
 
-use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use btfkit::color::{Transfer, srgb_decode, srgb_encode};
@@ -14,7 +13,7 @@ use btfkit_formats::Samples;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::fixture::{btf, fail, fixture, succeed};
+use crate::fixture::{btf, fail, fixture, shared, succeed};
 
 /// Samples of the images of a measurement, [y, x, channel] each.
 struct Photographs {
@@ -440,16 +439,6 @@ fn each_fault_is_found(base: &Photographs, otherwise: &[(&str, &[&str])]) {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
-
-/// An archive of the shared data, or a printed line where there is none.
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
-    if !path.exists() {
-        println!("skipped: no shared data {name}");
-        return None;
-    }
-    Some(path)
 }
 
 #[test]

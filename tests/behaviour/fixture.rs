@@ -135,3 +135,13 @@ pub fn tree_names(folder: &Path) -> Vec<PathBuf> {
     }
     names
 }
+
+/// A file of the shared data, or a printed line where there is none.
+pub fn shared(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
+    if !path.exists() {
+        println!("skipped: no shared data {name}");
+        return None;
+    }
+    Some(path)
+}

@@ -1,22 +1,10 @@
 //! Real measurements, where they are at hand beside the project; their licences keep them out of it.
 
-use std::path::PathBuf;
-
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use serde_json::Value;
 
-use crate::fixture::{btf, succeed};
-
-/// A file of the shared data, or a printed line where there is none.
-fn shared(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(name);
-    if !path.exists() {
-        println!("skipped: no shared data {name}");
-        return None;
-    }
-    Some(path)
-}
+use crate::fixture::{btf, shared, succeed};
 
 #[test]
 fn original_photographs_are_imported_and_have_upright_normals() {

@@ -12,6 +12,7 @@ mod inverse;
 mod lane;
 pub mod mode;
 
+pub use super::Kernel;
 use channels::{join, split};
 pub use lane::Lane;
 use mode::{DISTANCES, Mode};
@@ -152,36 +153,6 @@ impl<T: Lane> Deltas<T> {
         let expected = self.shape.samples() * T::BYTES * self.channels;
         assert_eq!((samples.len(), bytes.len()), (expected, expected));
         self.kernel.sums(bytes, self.shape, self.channels, &mut self.planes, samples);
-    }
-}
-
-/// Instructions to use, chosen once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kernel {
-    /// Whatever the program was compiled for.
-    Plain,
-    /// AVX2. (AVX-512 was measured on a Zen 4: 5% slower.)
-    #[cfg(target_arch = "x86_64")]
-    #[non_exhaustive] // so that only `available` can vouch for it
-    Avx2,
-}
-
-impl Kernel {
-    /// Every kernel that this machine can run, plain first, fastest last.
-    pub fn available() -> Vec<Self> {
-        #[allow(unused_mut)] // grows on x86 only
-        let mut kernels = vec![Self::Plain];
-        #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
-            kernels.push(Self::Avx2);
-        }
-        kernels
-    }
-
-    /// The fastest of them; `BTFKIT_KERNEL=plain` lowers the choice, to corner a fault.
-    pub fn fastest() -> Self {
-        let lowered = std::env::var_os("BTFKIT_KERNEL").is_some_and(|name| name == "plain");
-        if lowered { Self::Plain } else { Self::available().last().copied().unwrap_or(Self::Plain) }
     }
 }
 

@@ -74,7 +74,7 @@ impl ZipIndex {
     /// - [`ErrorKind::Malformed`]: not a zip; cut; the two headers of an entry disagree; the number of
     ///   entries is not the one declared; a name twice, not UTF-8, absolute or climbing by `..`;
     ///   entries that overlap; a size that no compression method reaches.
-    /// - [`ErrorKind::Unsupported`]: an encrypted entry, or a method other than stored and deflate.
+    /// - [`ErrorKind::Unsupported`]: an encrypted entry, a symbolic link, or a method other than stored and deflate.
     /// - [`ErrorKind::Limit`]: more entries, or a larger one, than `limits` allows.
     pub fn open(bytes: &[u8], limits: &Limits) -> Result<ZipIndex> {
         ZipIndex::open_mapped(bytes, limits, &mut |_| ())
@@ -238,6 +238,9 @@ fn check_entry(
     };
     if let Some(reason) = name::unsafe_reason(entry_name) {
         return Err(Error::malformed(reason, "a relative name").at(record.central_directory_offset()));
+    }
+    if record.mode().is_symlink() {
+        return Err(unsupported("a symbolic link".into(), "a file: a link could lead out of the archive"));
     }
     let flags = record.flags();
     if flags.is_encrypted() || flags.has_strong_encryption() || flags.is_masked() {

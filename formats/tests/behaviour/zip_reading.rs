@@ -209,3 +209,15 @@ fn what_is_no_zip_is_refused() {
         assert_eq!(ZipIndex::open(bytes, &Limits::default()).unwrap_err().kind(), ErrorKind::Malformed);
     }
 }
+
+#[test]
+fn a_symbolic_link_is_refused() {
+    let mut zip = raw_zip(&[RawEntry::stored("link.jpg", b"/etc/passwd")]);
+    assert!(ZipIndex::open(&zip, &Limits::default()).is_ok());
+    let directory = zip.windows(4).position(|bytes| bytes == b"PK\x01\x02").unwrap();
+    // Made by Unix; the upper half of the external attributes is the mode.
+    zip[directory + 5] = 3;
+    zip[directory + 40..directory + 42].copy_from_slice(&0o120_777u16.to_le_bytes());
+    let error = ZipIndex::open(&zip, &Limits::default()).unwrap_err();
+    assert!(error.to_string().contains("symbolic link"), "{error}");
+}

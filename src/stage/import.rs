@@ -244,3 +244,24 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
 pub fn default_store(archive: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.zarr", archive.file_stem().unwrap_or_default().to_string_lossy()))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn every_unit_belongs_to_one_part_and_parts_differ_by_one_unit_at_most() {
+        for parts in 1..9 {
+            let shards: Vec<Shard> =
+                (0..parts).map(|part| format!("{part}/{parts}").parse().unwrap()).collect();
+            assert!((0..81).all(|unit| shards.iter().filter(|shard| shard.has(unit)).count() == 1));
+            let counts: Vec<usize> =
+                shards.iter().map(|shard| (0..81).filter(|&unit| shard.has(unit)).count()).collect();
+            assert!(counts.iter().max().unwrap() - counts.iter().min().unwrap() <= 1, "{counts:?}");
+        }
+        for text in ["", "1", "4/4", "-1/2", "0/0", "a/b"] {
+            assert!(text.parse::<Shard>().is_err(), "{text}");
+        }
+    }
+}

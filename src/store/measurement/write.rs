@@ -1,5 +1,6 @@
 //! Writing one view: chunks gathered from its images, coded and encoded by many threads, one file a shard.
 
+use btfkit_formats::Samples;
 use rayon::prelude::*;
 
 use super::{CHUNK_SIDE, Description, Measurement};
@@ -68,12 +69,9 @@ impl Measurement {
         codes: &LightnessCodes,
         window: Window,
     ) -> Result<Encoded> {
-        let samples = images.gather(window);
-        let mut luminance = vec![0; window.size.texels() * self.description.lights.len()];
-        let all = codes.fill(&samples, &mut luminance);
-        let remarkable = self.inside(window, all, &samples, codes);
-        let (samples, codes) = encoders.encode(gather::bytes(&samples), &luminance)?;
-        Ok((samples, codes, remarkable))
+        let (texels, (samples, luminance, all)) = encoders.encode(images, codes, window)?;
+        let remarkable = self.inside(window, all, &texels, codes);
+        Ok((samples, luminance, remarkable))
     }
 
     /// What was found in the part of a chunk that lies within the plane.
@@ -81,7 +79,7 @@ impl Measurement {
         &self,
         window: Window,
         all: Remarkable,
-        samples: &btfkit_formats::Samples,
+        samples: &Samples,
         codes: &LightnessCodes,
     ) -> Remarkable {
         let Size { height, width } = self.description.size;
@@ -117,12 +115,20 @@ impl Encoders {
         })
     }
 
-    /// A chunk of samples and one of codes, encoded.
-    fn encode(&mut self, samples: &[u8], codes: &[u8]) -> Result<(Vec<u8>, Vec<u8>)> {
-        let mut encoded = (Vec::new(), Vec::new());
-        self.samples.encode(samples, &mut encoded.0)?;
-        self.codes.encode(codes, &mut encoded.1)?;
-        Ok(encoded)
+    /// A window's samples, what was found in them, and both of its chunks, encoded.
+    fn encode(
+        &mut self,
+        images: &Images,
+        codes: &LightnessCodes,
+        window: Window,
+    ) -> Result<(Samples, Encoded)> {
+        let samples = images.gather(window);
+        let mut luminance = vec![0; window.size.texels() * images.lights()];
+        let found = codes.fill(&samples, &mut luminance);
+        let (mut encoded, mut encoded_codes) = (Vec::new(), Vec::new());
+        self.samples.encode(gather::bytes(&samples), &mut encoded)?;
+        self.codes.encode(&luminance, &mut encoded_codes)?;
+        Ok((samples, (encoded, encoded_codes, found)))
     }
 }
 
@@ -134,9 +140,6 @@ pub(crate) fn encoded_bytes(
     images: &Images,
     window: Window,
 ) -> Result<usize> {
-    let samples = images.gather(window);
-    let mut luminance = vec![0; window.size.texels() * description.lights.len()];
-    codes.fill(&samples, &mut luminance);
-    let (samples, codes) = Encoders::new(description, codec)?.encode(gather::bytes(&samples), &luminance)?;
+    let (_, (samples, codes, _)) = Encoders::new(description, codec)?.encode(images, codes, window)?;
     Ok(samples.len() + codes.len())
 }

@@ -1,9 +1,12 @@
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use btfkit::error::{Error, Result};
 use btfkit::mrf;
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
+use btfkit::stage::cluster::{Amount, Step, Stepped};
+use btfkit::stage::import::Shard;
 use btfkit::stage::{cluster, compare, fit, image, normals, tile};
 use btfkit::store::field::FieldReport;
 use btfkit::store::measurement::Measurement;
@@ -25,9 +28,15 @@ struct TileOptions {
 
 #[derive(Args)]
 struct ClusterOptions {
-    /// Number of clusters, n_c
-    #[arg(long, default_value_t = 256)]
-    clusters: usize,
+    /// Number of clusters, n_c [default: 256]
+    #[arg(long, group = "amount")]
+    clusters: Option<usize>,
+    /// Instead: the fewest clusters whose mean weighted |dL*| from their centres is at most this
+    #[arg(long, group = "amount", value_name = "L*")]
+    error: Option<f64>,
+    /// Instead: as many as leave the model this many times smaller than the raw measurement
+    #[arg(long, group = "amount", value_name = "N")]
+    ratio: Option<f64>,
     /// Centre of a cluster
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
@@ -37,6 +46,15 @@ struct ClusterOptions {
     /// Least relative gain of the objective that is worth another pass
     #[arg(long, default_value_t = 1e-4)]
     tolerance: f64,
+    /// Draw first centres so many times and go on with the best
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    restarts: u32,
+    /// After this many seconds begin no further pass
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<u64>,
+    /// Take the clusters of another model of this measurement, whose tile holds this one
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "restarts", "time"])]
+    clusters_of: Option<PathBuf>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -45,6 +63,16 @@ enum Centre {
     Median,
     /// The textbook's K-means
     Mean,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum StepName {
+    /// The first approach, by one process
+    Prepare,
+    /// A share of a pass
+    Assign,
+    /// Sum up a pass, by one process
+    Reduce,
 }
 
 #[derive(Args)]
@@ -124,6 +152,20 @@ pub(super) struct Tile {
 
 /// Cluster the BRDFs of a model's tile
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf cluster wood.zarr wood.model.zarr --clusters 400
+  btf cluster wood.zarr wood.model.zarr --error 1.5         the fewest clusters that keep this mean |dL*|
+  btf cluster wood.zarr wood.model.zarr --ratio 200         as many as fit a two hundredth of the measurement
+  btf cluster wood.zarr second.model.zarr --clusters-of wood.model.zarr
+The whole plane once, and any tile that is cut from it is clustered already:
+  btf tile wood.zarr plane.model.zarr --tile none && btf cluster wood.zarr plane.model.zarr
+  btf model wood.zarr wood.model.zarr --clusters-of plane.model.zarr
+Many processes, the same bytes (exit code 66: something that this step needs is not there yet):
+  btf cluster wood.zarr plane.model.zarr --step prepare
+  btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
+  btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
+When nothing is gained any more, reduce writes the model, and further steps have nothing to do.")]
 pub(super) struct Cluster {
     /// The measurement
     measurement: PathBuf,
@@ -133,6 +175,15 @@ pub(super) struct Cluster {
     options: ClusterOptions,
     #[command(flatten)]
     seed: Seed,
+    /// Only one step, of work that many processes share
+    #[arg(long, value_enum, conflicts_with_all = ["clusters_of", "time"])]
+    step: Option<StepName>,
+    /// The pass of the step, from 0; over ones have nothing to do [default: the latest]
+    #[arg(long, requires = "step", value_name = "N")]
+    pass: Option<usize>,
+    /// Assign only part K of N of the pass
+    #[arg(long, requires = "step", value_name = "K/N", default_value = "0/1")]
+    shard: Shard,
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
@@ -200,8 +251,10 @@ impl Whole {
             return tell.plan(&plan.summary());
         }
         tell_tile(&plan.run(context)?, tell);
-        let plan = cluster_plan(&self.measurement, &model, &self.cluster, self.seed.seed)?;
-        tell_clusters(&plan.run(context)?, tell);
+        tell_clusters(
+            &run_clusters(&self.measurement, &model, &self.cluster, self.seed.seed, context)?,
+            tell,
+        );
         let plan = normals_plan(&self.measurement, &model, &self.normals)?;
         tell_normals(&plan.run(context)?, tell);
         let plan = fit_plan(&model, &self.fit)?;
@@ -223,12 +276,34 @@ impl Tile {
 
 impl Cluster {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let plan = cluster_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
+        let Self { measurement, model, options, seed, .. } = self;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return match &options.clusters_of {
+                Some(from) => tell.plan(&taken_plan(model, from)?.summary()),
+                None => tell.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
+            };
         }
-        tell_clusters(&plan.run(context)?, tell);
+        let Some(step) = self.step() else {
+            tell_clusters(&run_clusters(measurement, model, options, seed.seed, context)?, tell);
+            return Ok(());
+        };
+        match cluster_plan(measurement, model, options, seed.seed)?.step(step, context)? {
+            Stepped::Done(report) => tell_clusters(&report, tell),
+            Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
+            Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
+            Stepped::Assigned { pass, found, written } => {
+                tell.line(format!("pass {pass}: {written} parts assigned, {found} were done"));
+            }
+        }
         Ok(())
+    }
+
+    fn step(&self) -> Option<Step> {
+        Some(match self.step? {
+            StepName::Prepare => Step::Prepare,
+            StepName::Assign => Step::Assign(self.pass, self.shard),
+            StepName::Reduce => Step::Reduce(self.pass),
+        })
     }
 }
 
@@ -263,6 +338,24 @@ fn tile_plan(measurement: &Path, model: &Path, options: &TileOptions, seed: u64)
     })
 }
 
+/// Clusters, or takes the clusters of another model.
+fn run_clusters(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+    context: &Context<'_>,
+) -> Result<cluster::Report> {
+    match &options.clusters_of {
+        Some(from) => taken_plan(model, from)?.run(context),
+        None => cluster_plan(measurement, model, options, seed)?.run(context),
+    }
+}
+
+fn taken_plan(model: &Path, from: &Path) -> Result<cluster::TakenPlan> {
+    cluster::plan_taken(&cluster::TakenOptions { model: model.into(), from: from.into() })
+}
+
 fn cluster_plan(
     measurement: &Path,
     model: &Path,
@@ -274,8 +367,21 @@ fn cluster_plan(
         Centre::Mean => CentreRule::Mean,
     };
     let limits = Limits { passes: options.passes.max(1), tolerance: options.tolerance };
-    let (measurement, model) = (measurement.into(), model.into());
-    cluster::plan(&cluster::Options { measurement, model, clusters: options.clusters, centre, limits, seed })
+    let amount = match (options.clusters, options.error, options.ratio) {
+        (_, Some(error), _) => Amount::Error(error),
+        (_, _, Some(ratio)) => Amount::Ratio(ratio),
+        (clusters, ..) => Amount::Clusters(clusters.unwrap_or(256)),
+    };
+    cluster::plan(&cluster::Options {
+        measurement: measurement.into(),
+        model: model.into(),
+        amount,
+        centre,
+        limits,
+        restarts: options.restarts,
+        seed,
+        time: options.time.map(Duration::from_secs),
+    })
 }
 
 fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> Result<normals::Plan> {
@@ -312,11 +418,22 @@ fn tell_tile(report: &tile::Report, tell: Tell) {
 
 fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
+    let taken = report.taken_from.as_ref();
+    let how = taken.map_or(format!("after {} passes", report.passes.len()), |(name, texels)| {
+        format!("of {name}, where {texels} texels were clustered")
+    });
+    let represented = report
+        .representative_lightness_error
+        .map_or(String::new(), |error| format!(", {error:.3} from representatives"));
     tell.line(format!(
-        "clusters  {} after {} passes; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
-        report.clusters,
-        report.passes.len(),
-        report.representative_lightness_error
+        "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres{represented}",
+        report.clusters
+    ));
+    tell.line(format!(
+        "          representatives {:.3} from their centres, at most {:.3}; {} clusters of one texel",
+        report.representative_from_centre,
+        report.representative_from_centre_most,
+        report.single_texel_clusters
     ));
     let stored = report.representative_bytes + report.index_bytes;
     let ratio = |bytes: u64| bytes as f64 / stored as f64;

@@ -26,6 +26,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::sample::Kind;
 use crate::shape::Size;
+use crate::stage::cluster::Amount;
 use crate::stage::import::Shard;
 use crate::stage::tile::Choice;
 use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
@@ -201,8 +202,10 @@ fn analyse(
         let options = cluster::Options {
             measurement: measurement.clone(),
             model: model.clone(),
-            clusters: settings.clusters,
+            amount: Amount::Clusters(settings.clusters),
             centre: CentreRule::Median,
+            restarts: 1,
+            time: None,
             limits: Limits { passes: settings.passes, tolerance: settings.tolerance },
             seed: settings.seed,
         };

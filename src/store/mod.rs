@@ -11,6 +11,7 @@ pub mod mapped;
 pub mod measurement;
 pub mod model;
 pub mod output;
+pub mod passes;
 mod shard;
 
 use std::path::{Path, PathBuf};
@@ -202,6 +203,18 @@ impl Store {
             Some(FORMAT) => Ok(Some(ours.clone())),
             format => Err(damaged(format!("got layout format {format:?}, expected {FORMAT}"))),
         }
+    }
+
+    /// Our attributes of a group within the store; `None` where it is not there.
+    pub(crate) fn group(&self, group: &str) -> Result<Option<Map<String, Value>>> {
+        let file = self.path.join(group).join("zarr.json");
+        let text = match std::fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(Error::io("read", &file, error)),
+        };
+        let metadata: Value = serde_json::from_str(&text).map_err(|error| self.damaged(group, &error))?;
+        Ok(metadata.pointer("/attributes/btfkit").and_then(Value::as_object).cloned())
     }
 
     /// Begins a store of this kind with these attributes, unless there is one; returns those that hold.

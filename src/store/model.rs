@@ -123,11 +123,18 @@ impl Model {
     /// Where it has been run by another recipe.
     pub fn begin(&self, stage: Stage, recipe: &Value) -> Result<Option<Lock>> {
         let lock = self.store.lock(&format!("-{}", stage.name()))?;
-        let Some(entry) = self.stage(stage)? else { return Ok(Some(lock)) };
+        Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
+    }
+
+    /// Whether a stage is done by this recipe, and its arrays are all there.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self, stage: Stage, recipe: &Value) -> Result<bool> {
+        let Some(entry) = self.stage(stage)? else { return Ok(false) };
         let place = format!("{} ({})", self.path().display(), stage.name());
         recipe::expect_same(Path::new(&place), &entry, recipe)?;
-        let whole = stage.arrays(entry.get("report")).iter().all(|array| self.store.is_whole(array));
-        Ok(if whole { None } else { Some(lock) })
+        Ok(stage.arrays(entry.get("report")).iter().all(|array| self.store.is_whole(array)))
     }
 
     /// Declares a stage done; to be called after its arrays are written.
@@ -205,9 +212,33 @@ impl Model {
         Ok(Tile { size: Size::new(shape[0], shape[1]), source, wraps })
     }
 
-    /// Writes the cluster of each tile texel, u8 or u16 by their number.
-    pub fn write_index(&self, size: Size, index: &[u16], clusters: usize) -> Result<()> {
-        write_index(&self.store, size, index, clusters)
+    /// Writes what clusters are.
+    pub fn write_clusters(&self, clusters: &Clusters) -> Result<()> {
+        let count = clusters.sources.len();
+        write_index(&self.store, clusters.size, &clusters.index, count)?;
+        let [views, lights] = clusters.brdf;
+        let layout = Layout::small::<u8>(&["cluster", "view", "light"], &[count, views, lights]);
+        self.store.write("centres", &layout, &clusters.centres)?;
+        self.write_representatives(&clusters.representatives, &clusters.sources)?;
+        self.write_distance(count, &clusters.distance)
+    }
+
+    /// What clusters are.
+    pub fn read_clusters(&self) -> Result<Clusters> {
+        let count = self.clusters()?;
+        let [views, lights] = self.directions()?;
+        let brdf = [views.len(), lights.len()];
+        let (_, centres) = self.store.read::<u8>("centres", &[count, brdf[0], brdf[1]])?;
+        let (_, sources) = self.store.read::<u32>("representative_texel", &[count, 2])?;
+        Ok(Clusters {
+            size: self.tile()?.size,
+            index: self.index()?,
+            brdf,
+            centres,
+            representatives: self.representatives()?,
+            sources: sources.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
+            distance: self.distance()?,
+        })
     }
 
     /// The cluster of each tile texel.
@@ -237,17 +268,8 @@ impl Model {
             .hint("delete this array's folder and run the command that made it again")
     }
 
-    /// Writes centres [cluster, view, light], u8 L* codes.
-    pub fn write_centres(&self, shape: [usize; 3], centres: &[u8]) -> Result<()> {
-        self.store.write("centres", &Layout::small::<u8>(&["cluster", "view", "light"], &shape), centres)
-    }
-
     /// Writes representatives [cluster, view, light, channel] and where each was measured.
-    pub fn write_representatives(
-        &self,
-        representatives: &Representatives,
-        texels: &[[u32; 2]],
-    ) -> Result<()> {
+    fn write_representatives(&self, representatives: &Representatives, texels: &[[u32; 2]]) -> Result<()> {
         let names = ["cluster", "view", "light", "channel"];
         let shape = &representatives.shape;
         let channels = &representatives.channels;
@@ -277,7 +299,7 @@ impl Model {
     }
 
     /// Writes D of (26), [cluster, cluster], L* units.
-    pub fn write_distance(&self, clusters: usize, distance: &[f32]) -> Result<()> {
+    fn write_distance(&self, clusters: usize, distance: &[f32]) -> Result<()> {
         let mut layout = Layout::small::<f32>(&["cluster", "cluster_other"], &[clusters, clusters]);
         layout
             .attributes
@@ -320,6 +342,37 @@ impl Model {
     /// The random field model.
     pub fn field(&self) -> Result<FieldModel> {
         field::read(&self.store, &self.report(Stage::Fit)?)
+    }
+}
+
+/// Everything that clusters are in a model.
+pub struct Clusters {
+    /// Size of the tile.
+    pub size: Size,
+    /// Cluster of each texel of the tile.
+    pub index: Vec<u16>,
+    /// Views and lights.
+    pub brdf: [usize; 2],
+    /// Centres [cluster, view, light], L* codes.
+    pub centres: Vec<u8>,
+    /// Measured colour BRDFs.
+    pub representatives: Representatives,
+    /// Row and column in the measurement of each representative.
+    pub sources: Vec<[u32; 2]>,
+    /// D of (26), row by row.
+    pub distance: Vec<f32>,
+}
+
+impl Clusters {
+    /// Bytes of the representatives' samples.
+    pub fn representative_bytes(&self) -> u64 {
+        let samples = &self.representatives.samples;
+        (samples.len() * samples.sample_type().bytes()) as u64
+    }
+
+    /// Bytes of the tile's index.
+    pub fn index_bytes(&self) -> u64 {
+        self.index.len() as u64 * if self.sources.len() <= 256 { 1 } else { 2 }
     }
 }
 

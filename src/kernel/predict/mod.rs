@@ -168,8 +168,8 @@ macro_rules! kernels {
                 match self {
                     Self::Plain => $plain($($argument),*),
                     #[cfg(target_arch = "x86_64")]
-                    // SAFETY: `Avx2` is only ever constructed after the feature was found.
-                    Self::Avx2 => unsafe { avx2($($argument),*) },
+                    // SAFETY: these are only ever constructed after the feature was found. (AVX-512 gains nothing.)
+                    Self::Avx2 | Self::Avx512 => unsafe { avx2($($argument),*) },
                 }
             }
         )*}

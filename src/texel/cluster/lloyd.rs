@@ -1,19 +1,17 @@
-//! Passes of assignment and update until nothing moves.
+//! Passes of assignment and update over texels in memory, until nothing is gained.
 
-use rayon::prelude::*;
+use std::time::Instant;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::kernel::absolute_difference::Kernel;
+use crate::kernel::Kernel;
 use crate::run::Context;
-use crate::texel::cluster::centre::{self, CentreRule};
-use crate::texel::cluster::points::Points;
-
-/// Texels whose distances are computed in one go: their vectors stay in the second cache while the centres pass by.
-const BLOCK: usize = 64;
-
-/// Texels that a thread takes at a time; each such part keeps its own nearest texel of every centre.
-pub const PART: usize = 1024;
+use crate::texel::cluster::assign::{Assignment, Texels};
+use crate::texel::cluster::bounds::{Centres, Columns, Guide, Steps};
+use crate::texel::cluster::centre::{self, CentreRule, Members};
+use crate::texel::cluster::nearest::{Farthest, Near};
+use crate::texel::cluster::points::{Arrangement, Points};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -24,160 +22,156 @@ pub struct Limits {
     pub tolerance: f64,
 }
 
-/// A texel and its distance to a centre.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Near {
-    /// Fixed-point distance of (1).
-    pub distance: u64,
-    /// Texel number.
-    pub texel: u32,
+/// One pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pass {
+    /// Objective of (1) as a weighted mean |dL*| of a texel.
+    pub mean_lightness_error: f64,
+    /// The same in fixed point, summed over all texels.
+    pub objective: u64,
+    /// Texels that changed their cluster.
+    pub moved: usize,
+    /// Empty clusters that were given one of the farthest texels.
+    pub reseeded: usize,
 }
 
-/// What an assignment of all texels to centres found.
-pub struct Assignment {
-    /// Cluster of each texel, the nearest centre, ties to the smaller number.
-    pub index: Vec<u16>,
-    /// Distance of each texel to that centre.
-    pub distances: Vec<u64>,
-    /// The texel nearest to each centre, ties to the smaller number.
-    pub nearest: Vec<Near>,
-}
-
-impl Assignment {
-    /// Sum of all distances, the objective of (1).
-    pub fn objective(&self) -> u64 {
-        self.distances.iter().sum()
+impl Pass {
+    /// A pass over `texels` texels.
+    pub fn new(
+        arrangement: &Arrangement,
+        texels: usize,
+        objective: u64,
+        moved: usize,
+        reseeded: usize,
+    ) -> Self {
+        let mean_lightness_error = arrangement.mean_lightness(objective) / texels.max(1) as f64;
+        Self { mean_lightness_error, objective, moved, reseeded }
     }
 }
 
-/// Assigns every texel to its nearest centre.
-pub fn assign(points: &Points, centres: &[u8], kernel: Kernel) -> Assignment {
-    let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
-    let count = centres.len() / stride;
-    let parts: Vec<(Vec<u16>, Vec<u64>, Vec<Near>)> = points
-        .vectors
-        .par_chunks(PART * stride)
-        .enumerate()
-        .map(|(part, vectors)| {
-            let texels = vectors.len() / stride;
-            let mut all = vec![0; BLOCK.min(texels) * count];
-            let mut nearest = vec![Near { distance: u64::MAX, texel: u32::MAX }; count];
-            let (mut index, mut distances) = (Vec::with_capacity(texels), Vec::with_capacity(texels));
-            for vectors in vectors.chunks(BLOCK * stride) {
-                let all = &mut all[..vectors.len() / stride * count];
-                kernel.distances(vectors, centres, stride, groups, all);
-                for row in all.chunks_exact(count) {
-                    let texel = (part * PART + index.len()) as u32;
-                    let (mut best, mut least) = (0, u64::MAX);
-                    for (cluster, (&distance, nearest)) in row.iter().zip(&mut nearest).enumerate() {
-                        if distance < least {
-                            (best, least) = (cluster, distance);
-                        }
-                        *nearest = (*nearest).min(Near { distance, texel });
-                    }
-                    index.push(best as u16);
-                    distances.push(least);
-                }
-            }
-            (index, distances, nearest)
-        })
-        .collect();
-    let mut whole = Assignment {
-        index: Vec::with_capacity(points.len()),
-        distances: Vec::with_capacity(points.len()),
-        nearest: vec![Near { distance: u64::MAX, texel: u32::MAX }; count],
-    };
-    for (index, distances, nearest) in parts {
-        whole.index.extend(index);
-        whole.distances.extend(distances);
-        for (all, part) in whole.nearest.iter_mut().zip(nearest) {
-            *all = (*all).min(part);
-        }
+/// Tells the last pass beside the bar.
+pub fn tell(passes: &[Pass], context: &Context<'_>) {
+    if let Some(Pass { mean_lightness_error, moved, .. }) = passes.last() {
+        let number = passes.len();
+        context
+            .progress
+            .remark(&format!("pass {number}: mean |dL*| {mean_lightness_error:.4}, {moved} texels moved"));
     }
-    whole
 }
 
-/// Centres after convergence, and how it went.
+impl Limits {
+    /// Whether these passes are enough: the last one found no cluster empty, and it moved nothing or gained
+    /// too little; or there are as many as allowed.
+    pub fn reached(&self, passes: &[Pass]) -> bool {
+        let settled = passes.last().is_some_and(|last| {
+            let before = passes.len().checked_sub(2).map_or(u64::MAX, |before| passes[before].objective);
+            let gain = (before as f64 - last.objective as f64) / (before as f64).max(1.0);
+            last.reseeded == 0 && (last.moved == 0 || gain < self.tolerance)
+        });
+        settled || passes.len() >= self.passes
+    }
+}
+
+/// Centres after the last pass, and how it went.
 pub struct Clustering {
     /// Centres [cluster, stride].
     pub centres: Vec<u8>,
-    /// Assignment of the texels to exactly these centres.
-    pub assignment: Assignment,
+    /// Cluster of each texel: the nearest of exactly these centres, ties to the smaller number.
+    pub index: Vec<u16>,
+    /// The texel nearest to each centre, ties to the smaller number.
+    pub nearest: Vec<Near>,
     /// What each pass found.
     pub passes: Vec<Pass>,
 }
 
-/// One pass.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct Pass {
-    /// Objective of (1) as a weighted mean |dL*| of a texel.
-    pub mean_lightness_error: f64,
-    /// Texels that changed their cluster.
-    pub moved: usize,
-    /// Empty clusters that were given the farthest texel.
-    pub reseeded: usize,
+impl Clustering {
+    /// Weighted mean |dL*| of the texels from their centres.
+    pub fn mean_lightness_error(&self) -> f64 {
+        self.passes.last().map_or(0.0, |pass| pass.mean_lightness_error)
+    }
 }
 
-/// Improves centres pass by pass from those of the `seeds` texels.
-pub fn run(
-    points: &Points,
-    seeds: &[usize],
-    rule: CentreRule,
-    limits: Limits,
-    kernel: Kernel,
-    context: &Context<'_>,
-) -> Result<Clustering> {
-    let mut centres: Vec<u8> = seeds.iter().flat_map(|&texel| points.vector(texel)).copied().collect();
+/// How to improve centres.
+#[derive(Clone, Copy, Debug)]
+pub struct Method {
+    /// How centres follow from their texels.
+    pub rule: CentreRule,
+    /// When to stop.
+    pub limits: Limits,
+    /// Columns of bounds a texel; they change the time, not the result.
+    pub columns: usize,
+    /// Instructions to use; the same.
+    pub kernel: Kernel,
+    /// After this moment no pass begins.
+    pub deadline: Option<Instant>,
+}
+
+impl Method {
+    /// Whether these passes are enough.
+    pub fn is_done(&self, passes: &[Pass]) -> bool {
+        self.limits.reached(passes) || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// Improves first centres [cluster, stride] pass by pass.
+pub fn run(points: &Points, first: Vec<u8>, method: Method, context: &Context<'_>) -> Result<Clustering> {
+    let Method { rule, kernel, .. } = method;
+    let arrangement = &points.arrangement;
+    let stride = arrangement.stride();
+    let clusters = first.len() / stride;
+    let steps = Steps::of(arrangement);
+    let columns = Columns::new(&Centres { arrangement, vectors: &first, kernel }, method.columns);
+    let numbers: Vec<u32> = (0..points.len() as u32).collect();
+    let (mut index, mut bounds) = (vec![0; points.len()], vec![0; points.len() * columns.count()]);
+    let mut distances = vec![0; points.len()];
+    let (mut centres, mut guide) = (first, None);
     let mut passes: Vec<Pass> = Vec::new();
-    let mut before: Option<Assignment> = None;
     loop {
         context.check_stop()?;
-        let assignment = assign(points, &centres, kernel);
-        let mut members = vec![Vec::new(); seeds.len()];
-        for (texel, &cluster) in assignment.index.iter().enumerate() {
-            members[usize::from(cluster)].push(texel as u32);
-        }
-        let reseeded = reseed_empty(&mut members, &assignment);
-        let moved = before.as_ref().map_or(points.len(), |before| {
-            before.index.iter().zip(&assignment.index).filter(|(a, b)| a != b).count()
+        let before = index.clone();
+        let assignment = Assignment {
+            centres: Centres { arrangement, vectors: &centres, kernel },
+            columns: &columns,
+            steps,
+            guide,
+        };
+        let nearest = assignment.assign(&mut Texels {
+            vectors: &points.vectors,
+            numbers: &numbers,
+            index: &mut index,
+            bounds: &mut bounds,
+            distances: &mut distances,
         });
-        let objective = assignment.objective();
-        let mean_lightness_error = points.arrangement.mean_lightness(objective) / points.len() as f64;
-        passes.push(Pass { mean_lightness_error, moved, reseeded });
-        context.progress.remark(&format!("mean |dL*| {mean_lightness_error:.4}, {moved} texels moved"));
-        context.progress.advance(1);
-        let gain = before.as_ref().map_or(f64::INFINITY, |before| {
-            let previous = before.objective() as f64;
-            (previous - objective as f64) / previous.max(1.0)
-        });
-        let settled = reseeded == 0 && (moved == 0 || gain < limits.tolerance);
-        if settled || passes.len() >= limits.passes {
-            return Ok(Clustering { centres, assignment, passes });
+        let members = Members::of(&index, clusters);
+        let mut changed = vec![passes.is_empty(); clusters];
+        let mut moved = if passes.is_empty() { points.len() } else { 0 };
+        for (&before, &now) in before.iter().zip(&index).filter(|(before, now)| before != now) {
+            changed[usize::from(before)] = true;
+            changed[usize::from(now)] = true;
+            moved += usize::from(!passes.is_empty());
         }
-        centre::update(points, &members, rule, &mut centres);
-        before = Some(assignment);
-    }
-}
-
-/// Gives each empty cluster the texel farthest from its own centre (ties: the smaller number).
-fn reseed_empty(members: &mut [Vec<u32>], assignment: &Assignment) -> usize {
-    let empty: Vec<usize> = (0..members.len()).filter(|&cluster| members[cluster].is_empty()).collect();
-    if empty.is_empty() {
-        return 0;
-    }
-    let mut farthest: Vec<u32> = (0..assignment.index.len() as u32).collect();
-    farthest.sort_by_key(|&texel| (std::cmp::Reverse(assignment.distances[texel as usize]), texel));
-    let mut given = 0;
-    for &texel in &farthest {
-        let Some(&cluster) = empty.get(given) else { break };
-        let home = &mut members[usize::from(assignment.index[texel as usize])];
-        if assignment.distances[texel as usize] > 0 && home.len() > 1 {
-            home.retain(|&member| member != texel);
-            members[cluster].push(texel);
-            given += 1;
+        let empty: Vec<usize> =
+            (0..clusters).filter(|&cluster| members.cluster(cluster).is_empty()).collect();
+        let farthest = if empty.is_empty() {
+            Farthest::default()
+        } else {
+            Farthest::of(distances.iter().zip(&numbers).map(|(&distance, &texel)| Near { distance, texel }))
+        };
+        let reseeded = empty.len().min(farthest.texels().len());
+        passes.push(Pass::new(arrangement, points.len(), distances.iter().sum(), moved, reseeded));
+        tell(&passes, context);
+        if method.is_done(&passes) {
+            return Ok(Clustering { centres, index, nearest, passes });
         }
+        let old = centres.clone();
+        centre::update(points, &members, &changed, rule, kernel, &mut centres);
+        for (&cluster, near) in empty.iter().zip(farthest.texels()) {
+            centres[cluster * stride..(cluster + 1) * stride]
+                .copy_from_slice(points.vector(near.texel as usize));
+        }
+        let now = Centres { arrangement, vectors: &centres, kernel };
+        guide = Some(Guide::new(&now, &columns, steps, &old, &nearest));
     }
-    given
 }
 
 #[cfg(test)]
@@ -210,67 +204,93 @@ mod tests {
         Points { arrangement, vectors }
     }
 
-    fn cluster(
-        points: &Points,
-        count: usize,
-        threads: usize,
-        kernel: Kernel,
-        rule: CentreRule,
-    ) -> Clustering {
+    fn cluster(points: &Points, count: usize, threads: usize, method: Method) -> Clustering {
         let stop = AtomicBool::new(false);
         let context = Context::new(&Silent, &stop, threads, 1 << 30).unwrap();
         context.install(|| {
-            let seeds = seeding::draw(points, count, 1, kernel, &context).unwrap();
-            run(points, &seeds, rule, Limits { passes: 50, tolerance: 0.0 }, kernel, &context).unwrap()
+            let seeds = seeding::draw(points, count, 1, 0, method.kernel, &context).unwrap();
+            run(points, points.vectors_of(&seeds), method, &context).unwrap()
         })
+    }
+
+    fn method(rule: CentreRule, columns: usize, kernel: Kernel) -> Method {
+        Method { rule, limits: Limits { passes: 50, tolerance: 0.0 }, columns, kernel, deadline: None }
+    }
+
+    fn distance(points: &Points, texel: usize, centre: &[u8]) -> u64 {
+        let vector = points.vector(texel);
+        let sum = |range: std::ops::Range<usize>| -> u64 {
+            range.map(|n| u64::from(vector[n].abs_diff(centre[n]))).sum()
+        };
+        points.arrangement.groups().iter().map(|g| u64::from(g.weight) * sum(g.start..g.end)).sum()
     }
 
     #[test]
     fn the_assignment_is_the_true_argmin_and_the_objective_never_rises() {
-        let points = points(600, 9);
-        let result = cluster(&points, 7, 2, Kernel::fastest(), CentreRule::Median);
-        assert!(result.passes.windows(2).all(|p| p[1].mean_lightness_error <= p[0].mean_lightness_error));
-        let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
-        let distance = |texel: usize, cluster: usize| -> u64 {
-            let (a, b) = (points.vector(texel), &result.centres[cluster * stride..(cluster + 1) * stride]);
-            groups
-                .iter()
-                .map(|g| {
-                    u64::from(g.weight)
-                        * (g.start..g.end).map(|n| u64::from(a[n].abs_diff(b[n]))).sum::<u64>()
-                })
-                .sum()
-        };
-        for texel in 0..points.len() {
-            let best = (0..7).min_by_key(|&cluster| distance(texel, cluster)).unwrap();
-            assert_eq!(usize::from(result.assignment.index[texel]), best);
-            assert_eq!(result.assignment.distances[texel], distance(texel, best));
-        }
-        for cluster in 0..7 {
-            let best = (0..points.len()).min_by_key(|&texel| distance(texel, cluster)).unwrap();
-            assert_eq!(result.assignment.nearest[cluster].texel as usize, best);
+        for (columns, rule) in [(1, CentreRule::Median), (3, CentreRule::Median), (16, CentreRule::Mean)] {
+            let points = points(900, 300);
+            let result = cluster(&points, 16, 2, method(rule, columns, Kernel::fastest()));
+            let falls = |p: &[Pass]| p[1].objective <= p[0].objective;
+            assert!(result.passes.len() > 3);
+            assert!(rule == CentreRule::Mean || result.passes.windows(2).all(falls));
+            let centres: Vec<&[u8]> = result.centres.chunks_exact(points.arrangement.stride()).collect();
+            let mut objective = 0;
+            for texel in 0..points.len() {
+                let best = (0..16).min_by_key(|&cluster| distance(&points, texel, centres[cluster])).unwrap();
+                assert_eq!(usize::from(result.index[texel]), best, "texel {texel}, {columns} columns");
+                objective += distance(&points, texel, centres[best]);
+            }
+            assert_eq!(result.passes.last().unwrap().objective, objective);
+            for (cluster, (centre, nearest)) in centres.iter().zip(&result.nearest).enumerate() {
+                let key = |&texel: &usize| (distance(&points, texel, centre), texel);
+                let best = (0..points.len()).min_by_key(key).unwrap();
+                assert_eq!(nearest.texel as usize, best, "cluster {cluster}");
+                assert_eq!(nearest.distance, distance(&points, best, centre));
+            }
         }
     }
 
     #[test]
     fn separate_kinds_are_found() {
         let points = points(400, 5);
-        let result = cluster(&points, 5, 2, Kernel::fastest(), CentreRule::Median);
+        let result = cluster(&points, 5, 2, method(CentreRule::Median, 5, Kernel::fastest()));
         for texel in 0..points.len() {
-            assert_eq!(result.assignment.index[texel], result.assignment.index[texel % 5]);
+            assert_eq!(result.index[texel], result.index[texel % 5]);
         }
     }
 
     #[test]
-    fn threads_and_kernels_do_not_change_the_result() {
-        let points = points(1000, 40);
+    fn threads_kernels_and_bounds_do_not_change_the_result() {
+        let points = points(1000, 300);
         for rule in [CentreRule::Median, CentreRule::Mean] {
-            let reference = cluster(&points, 16, 1, Kernel::Plain, rule);
+            let reference = cluster(&points, 16, 1, method(rule, 1, Kernel::Plain));
             for kernel in Kernel::available() {
-                let result = cluster(&points, 16, 3, kernel, rule);
-                assert_eq!(result.centres, reference.centres);
-                assert_eq!(result.assignment.index, reference.assignment.index);
+                for columns in [1, 2, 5, 16] {
+                    let result = cluster(&points, 16, 3, method(rule, columns, kernel));
+                    assert_eq!(result.centres, reference.centres);
+                    assert_eq!(result.index, reference.index);
+                    assert_eq!(result.nearest, reference.nearest);
+                    assert_eq!(result.passes, reference.passes);
+                }
             }
+        }
+    }
+
+    #[test]
+    fn identical_centres_go_by_the_smaller_number() {
+        let points = points(300, 7);
+        let first = points.vectors_of(&[0, 1, 0, 2, 1, 0]);
+        let kernel = Kernel::fastest();
+        let stop = AtomicBool::new(false);
+        let context = Context::new(&Silent, &stop, 2, 1 << 30).unwrap();
+        for columns in [1, 2, 6] {
+            let method = Method {
+                limits: Limits { passes: 1, tolerance: 0.0 },
+                ..method(CentreRule::Median, columns, kernel)
+            };
+            let result = run(&points, first.clone(), method, &context).unwrap();
+            assert!(result.index.iter().all(|cluster| [0, 1, 3].contains(cluster)));
+            assert_eq!(result.passes[0].reseeded, 3);
         }
     }
 
@@ -278,6 +298,6 @@ mod tests {
     fn fewer_distinct_brdfs_than_clusters_give_fewer_clusters() {
         let points = points(3, 3);
         let copies = Points { arrangement: points.arrangement.clone(), vectors: points.vectors.repeat(4) };
-        assert_eq!(cluster(&copies, 8, 1, Kernel::Plain, CentreRule::Median).assignment.nearest.len(), 3);
+        assert_eq!(cluster(&copies, 8, 1, method(CentreRule::Median, 8, Kernel::Plain)).nearest.len(), 3);
     }
 }

@@ -1,12 +1,32 @@
 //! Clustering of BRDFs under (1), exact in whole numbers and therefore the same whatever the
 //! threads and kernels.
 
+pub mod assign;
+pub mod bounds;
 pub mod centre;
 pub mod lloyd;
+pub mod nearest;
 pub mod points;
+pub mod search;
 pub mod seeding;
+pub mod selection;
+pub mod tally;
 
-use crate::texel::cluster::points::Arrangement;
+use crate::kernel::Kernel;
+use crate::texel::cluster::points::{Arrangement, Points};
+
+/// Sum of the distances of texels from the vectors [cluster, stride] of their clusters.
+pub fn total_distance(points: &Points, vectors: &[u8], index: &[u16], kernel: Kernel) -> u64 {
+    use rayon::prelude::*;
+    let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
+    let texels = points.vectors.par_chunks_exact(stride).zip(index);
+    texels
+        .map(|(point, &cluster)| {
+            let centre = &vectors[usize::from(cluster) * stride..][..stride];
+            kernel.row_distances(point, [centre], groups)[0]
+        })
+        .sum()
+}
 
 /// Distances D of (26) between BRDFs of L* codes [brdf, view, light], in L* units: symmetric, row by row.
 pub fn distance_matrix(brdfs: &[u8], arrangement: &Arrangement) -> Vec<f32> {

@@ -79,6 +79,14 @@ impl Arrangement {
         }
     }
 
+    /// Puts together the vector of the texel at `place` in windows of all views, each [texel, light].
+    pub fn gather(&self, vector: &mut [u8], views: &[Vec<u8>], place: usize) {
+        for (&start, codes) in self.view_start.iter().zip(views) {
+            let codes = &codes[place * self.lights..(place + 1) * self.lights];
+            vector[start..start + self.lights].copy_from_slice(codes);
+        }
+    }
+
     /// Vectors [n, stride] in the plain order [n, view, light].
     pub fn plain(&self, vectors: &[u8]) -> Vec<u8> {
         let mut plain = Vec::with_capacity(vectors.len());
@@ -89,9 +97,21 @@ impl Arrangement {
         }
         plain
     }
+
+    /// Vectors [n, stride] from codes in the plain order [n, view, light].
+    pub fn arranged(&self, plain: &[u8]) -> Vec<u8> {
+        let brdf = self.view_start.len() * self.lights;
+        let mut vectors = vec![0; plain.len() / brdf * self.stride];
+        for (vector, plain) in vectors.chunks_exact_mut(self.stride).zip(plain.chunks_exact(brdf)) {
+            for (&start, codes) in self.view_start.iter().zip(plain.chunks_exact(self.lights)) {
+                vector[start..start + self.lights].copy_from_slice(codes);
+            }
+        }
+        vectors
+    }
 }
 
-/// The BRDFs of a tile, in memory.
+/// BRDFs in memory.
 pub struct Points {
     /// Where directions lie in a vector.
     pub arrangement: Arrangement,
@@ -114,6 +134,11 @@ impl Points {
     pub fn vector(&self, texel: usize) -> &[u8] {
         let stride = self.arrangement.stride;
         &self.vectors[texel * stride..(texel + 1) * stride]
+    }
+
+    /// The vectors of some texels, one after another.
+    pub fn vectors_of(&self, texels: &[u32]) -> Vec<u8> {
+        texels.iter().flat_map(|&texel| self.vector(texel as usize)).copied().collect()
     }
 }
 
@@ -138,5 +163,6 @@ mod tests {
         let expected: Vec<u8> =
             (0..2).flat_map(|t| (0..3).flat_map(move |v| (0..5).map(move |l| v * 10 + t * 5 + l))).collect();
         assert_eq!(arrangement.plain(&vectors), expected);
+        assert_eq!(arrangement.arranged(&expected), vectors);
     }
 }

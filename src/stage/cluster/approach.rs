@@ -1,0 +1,154 @@
+//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from
+//! the whole measurement.
+
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::stage::cluster::budget::Budget;
+use crate::stage::cluster::finish::Clustered;
+use crate::stage::cluster::stream::Stream;
+use crate::stage::cluster::{Amount, Plan, Report};
+use crate::store::passes::{History, State};
+use crate::texel::cluster::lloyd::{self, Clustering, Method};
+use crate::texel::cluster::points::Points;
+use crate::texel::cluster::search::{Trial, Trials, more_clusters};
+use crate::texel::cluster::{seeding, total_distance};
+
+impl Plan {
+    /// Clusters all texels in memory.
+    pub(super) fn run_in_memory(&self, deadline: Option<Instant>, context: &Context<'_>) -> Result<Report> {
+        let budget = Budget::of_first_approach(self, context)?;
+        let points = self.read_sample(context)?;
+        let method = self.method(budget.sample_columns, deadline);
+        let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;
+        let texels: Vec<u32> = clustering.nearest.iter().map(|near| near.texel).collect();
+        let representatives = points.vectors_of(&texels);
+        let from_representatives =
+            context.install(|| total_distance(&points, &representatives, &clustering.index, method.kernel));
+        drop(points);
+        let history = History { passes: clustering.passes, trials, ..History::default() };
+        self.finish(
+            &Clustered {
+                centres: clustering.centres,
+                index: clustering.index,
+                nearest: clustering.nearest,
+                history,
+                from_representatives: Some(from_representatives),
+            },
+            context,
+        )
+    }
+
+    /// What the first pass over all texels begins with.
+    pub(super) fn approach(&self, deadline: Option<Instant>, context: &Context<'_>) -> Result<State> {
+        let budget = Budget::of_first_approach(self, context)?;
+        let points = self.read_sample(context)?;
+        let method = self.method(budget.sample_columns, deadline);
+        let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;
+        Ok(self.state_of(clustering, History { trials, ..History::default() }))
+    }
+
+    /// The same with more clusters than those that left too large an error.
+    pub(super) fn approach_more(
+        &self,
+        history: History,
+        deadline: Option<Instant>,
+        context: &Context<'_>,
+    ) -> Result<State> {
+        let clusters = self.more_than_tried(&history);
+        let method = self.method(Budget::of(self, clusters, context)?.sample_columns, deadline);
+        let points = self.read_sample(context)?;
+        context.progress.begin("cluster sample", clusters as u64, Counted::Items("centres"));
+        let mut trials = Trials::new(&points, method, self.options.seed);
+        let clustering = context.install(|| trials.run(clusters, context))?;
+        context.progress.end();
+        Ok(self.state_of(clustering, history))
+    }
+
+    /// Clusters to try after those that were too few.
+    fn more_than_tried(&self, history: &History) -> usize {
+        match (history.attempts.last(), self.options.amount) {
+            (Some(last), Amount::Error(target)) => {
+                more_clusters(last.clusters, last.mean_lightness_error, target, &history.trials)
+                    .min(self.most_clusters)
+            }
+            _ => self.most_clusters,
+        }
+    }
+
+    fn state_of(&self, clustering: Clustering, history: History) -> State {
+        State {
+            centres: self.arrangement.plain(&clustering.centres),
+            index: Vec::new(),
+            history: History {
+                passes: Vec::new(),
+                sample_texels: self.sample_texels(),
+                sample_passes: clustering.passes,
+                ..history
+            },
+        }
+    }
+
+    /// Clusters texels in memory: the best of some draws, or the fewest clusters that do.
+    fn cluster_points(
+        &self,
+        points: &Points,
+        most: usize,
+        method: Method,
+        context: &Context<'_>,
+    ) -> Result<(Clustering, Vec<Trial>)> {
+        let most = most.min(points.len());
+        context.progress.begin("cluster", most as u64, Counted::Items("centres"));
+        let found = context.install(|| match self.options.amount {
+            Amount::Error(target) => {
+                let mut trials = Trials::new(points, method, self.options.seed);
+                let Some(clustering) = trials.fewest(target, most, context)? else {
+                    return Err(Error::usage(format!("{most} clusters leave a mean |dL*| above {target}"))
+                        .hint(
+                            "choose a larger --error, more --memory to search in, or a number of --clusters",
+                        ));
+                };
+                Ok((clustering, trials.found()))
+            }
+            Amount::Clusters(_) | Amount::Ratio(_) => {
+                let mut best: Option<Clustering> = None;
+                for attempt in 0..self.options.restarts.max(1) {
+                    let seeds =
+                        seeding::draw(points, most, self.options.seed, attempt, method.kernel, context)?;
+                    let clustering = lloyd::run(points, points.vectors_of(&seeds), method, context)?;
+                    let objective = |c: &Clustering| c.passes.last().map_or(0, |pass| pass.objective);
+                    if best.as_ref().is_none_or(|best| objective(&clustering) < objective(best)) {
+                        best = Some(clustering);
+                    }
+                }
+                let best = best.ok_or_else(|| Error::internal("no draw of first centres"))?;
+                Ok((best, Vec::new()))
+            }
+        })?;
+        context.progress.end();
+        Ok(found)
+    }
+
+    /// Reads the texels of the sample, in the order of their numbers.
+    fn read_sample(&self, context: &Context<'_>) -> Result<Points> {
+        let sample = self.selection.sample(self.sample_texels(), self.options.seed);
+        let stride = self.arrangement.stride();
+        let mut vectors = vec![0; sample.len() * stride];
+        let title = if self.fits_the_sample() { "read luminance" } else { "read sample" };
+        context.progress.begin(title, self.selection.texels() as u64, Counted::Items("texels"));
+        let mut stream = Stream::new(&self.measurement, &self.arrangement, &self.selection, 0);
+        stream.for_each(0..self.selection.blocks().len(), context, |block, read| {
+            for (vector, number) in read.chunks_exact(stride).zip(self.selection.numbers(block.slots.clone()))
+            {
+                if let Ok(at) = sample.binary_search(number) {
+                    vectors[at * stride..(at + 1) * stride].copy_from_slice(vector);
+                }
+            }
+            Ok(())
+        })?;
+        context.progress.end();
+        Ok(Points { arrangement: self.arrangement.clone(), vectors })
+    }
+}

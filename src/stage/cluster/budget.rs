@@ -1,0 +1,115 @@
+//! What memory allows: how many bounds a texel has and how many blocks are kept.
+
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::stage::cluster::stream::Stream;
+use crate::stage::cluster::{Amount, Plan};
+use crate::texel::cluster::tally::Tally;
+
+/// The program itself, and what allocators keep.
+const PROGRAM_BYTES: usize = 48 << 20;
+
+/// Most bytes of the sample's vectors. Fixed, so that a result does not depend on memory.
+const SAMPLE_BYTES: usize = 192 << 20;
+
+/// Texels whose distances to all centres a thread holds.
+const TABLE_TEXELS: usize = 64;
+
+/// How memory is spent.
+pub(super) struct Budget {
+    /// Clusters that it is for.
+    pub(super) clusters: usize,
+    /// Columns of bounds of a texel in the sample.
+    pub(super) sample_columns: usize,
+    /// Columns of bounds of a texel in passes over all.
+    pub(super) columns: usize,
+    /// Blocks that are kept from pass to pass.
+    pub(super) kept_blocks: usize,
+}
+
+impl Plan {
+    /// Texels of the sample.
+    pub(super) fn sample_texels(&self) -> usize {
+        (SAMPLE_BYTES / self.arrangement.stride()).min(self.selection.texels())
+    }
+
+    /// Whether the sample is all texels.
+    pub(super) fn fits_the_sample(&self) -> bool {
+        self.sample_texels() == self.selection.texels()
+    }
+}
+
+impl Budget {
+    /// Bytes below which there is no budget for so many clusters.
+    fn least(plan: &Plan, clusters: usize, threads: usize) -> usize {
+        let both = Needs::both(plan, clusters, threads);
+        both.map(|needs| needs.fixed + needs.texels * size_of::<u16>()).into_iter().max().unwrap_or(0)
+    }
+
+    /// What the context's memory allows for so many clusters.
+    ///
+    /// # Errors
+    /// Where there is too little for one column of bounds.
+    pub(super) fn of(plan: &Plan, clusters: usize, context: &Context<'_>) -> Result<Self> {
+        let needed = Self::least(plan, clusters, context.threads);
+        let memory = usize::try_from(context.memory_bytes).unwrap_or(usize::MAX);
+        if needed > memory {
+            return Err(Error::usage(format!(
+                "clustering {} texels into {clusters} clusters takes {} MiB of memory at least, {} MiB are allowed",
+                plan.selection.texels(),
+                needed.div_ceil(1 << 20),
+                memory >> 20
+            ))
+            .hint("choose a larger --memory, fewer clusters, or --centre mean, which takes less"));
+        }
+        let [sample, all] = Needs::both(plan, clusters, context.threads);
+        let columns = |needs: &Needs| {
+            ((memory - needs.fixed) / (needs.texels * size_of::<u16>()).max(1)).clamp(1, clusters)
+        };
+        let left = memory - all.fixed - all.texels * columns(&all) * size_of::<u16>();
+        let block = plan.selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(1);
+        Ok(Self {
+            clusters,
+            sample_columns: columns(&sample),
+            columns: columns(&all),
+            kept_blocks: left / (block * plan.arrangement.stride()),
+        })
+    }
+
+    /// The same for as many clusters as are asked for, or as a search may go up to within memory.
+    pub(super) fn of_first_approach(plan: &Plan, context: &Context<'_>) -> Result<Self> {
+        let mut clusters = plan.most_clusters;
+        if let Amount::Error(_) = plan.options.amount {
+            while clusters > 1 && Self::least(plan, clusters, context.threads) as u64 > context.memory_bytes {
+                clusters /= 2;
+            }
+        }
+        Self::of(plan, clusters, context)
+    }
+}
+
+/// Bytes that a phase takes beside bounds and kept blocks, and the texels that bounds are for.
+struct Needs {
+    fixed: usize,
+    texels: usize,
+}
+
+impl Needs {
+    /// Those of the first approach and of a pass over all texels.
+    fn both(plan: &Plan, clusters: usize, threads: usize) -> [Self; 2] {
+        let stride = plan.arrangement.stride();
+        // Sources, places, numbers, index now and before, distances.
+        let texels = plan.selection.texels();
+        let listed = texels * (8 + 4 + 4 + 2 + 2);
+        let tables = threads * clusters * (TABLE_TEXELS * size_of::<u64>() + 16);
+        let between = clusters * clusters * (size_of::<u64>() + size_of::<u16>());
+        let flight = Stream::bytes_in_flight(&plan.selection, &plan.arrangement);
+        let common = PROGRAM_BYTES + listed + tables + between + 4 * clusters * stride;
+        let sample = plan.sample_texels();
+        let tally = Tally::bytes(plan.options.centre, clusters, stride);
+        [
+            Self { fixed: common + sample * (stride + 40) + flight, texels: sample },
+            Self { fixed: common + flight + tally, texels },
+        ]
+    }
+}

@@ -1,0 +1,384 @@
+//! Tile to clusters: index, centres, representatives and their distances.
+//!
+//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go passes over all
+//! texels ([`pass`]) that read each chunk once. What memory allows never changes a result: it only says how many bounds
+//! and blocks are kept.
+
+mod approach;
+mod budget;
+mod finish;
+mod pass;
+mod stream;
+mod taken;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::error::{Error, Result};
+use crate::kernel::Kernel;
+use crate::run::Context;
+use crate::stage::import::Shard;
+use crate::store::measurement::Measurement;
+use crate::store::model::{Model, Stage};
+use crate::store::passes::{Passes, State};
+use crate::texel::cluster::centre::CentreRule;
+use crate::texel::cluster::lloyd::{Limits, Method, Pass};
+use crate::texel::cluster::points::Arrangement;
+use crate::texel::cluster::search::Trial;
+use crate::texel::cluster::selection::Selection;
+use crate::texel::tile::Tile;
+use pass::{Next, Work};
+pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
+
+/// Version of this stage's method, part of its recipe: raised when a change makes other bytes.
+const METHOD: u64 = 2;
+
+/// Most clusters: the index is u16.
+const MOST_CLUSTERS: usize = 1 << 16;
+
+/// Most clusters that a search for an error goes up to.
+const MOST_SEARCHED: usize = 4096;
+
+/// The folder in a model that holds the passes of a clustering on its way.
+const PASSES: &str = "clustering";
+
+/// How many clusters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Amount {
+    /// This many, n_c.
+    Clusters(usize),
+    /// The fewest whose weighted mean |dL*| from the centres is at most this.
+    Error(f64),
+    /// The most that leave representatives and index this many times smaller than the raw measurement.
+    Ratio(f64),
+}
+
+/// How to cluster.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The measurement that the tile was cut from.
+    pub measurement: PathBuf,
+    /// The model with the tile.
+    pub model: PathBuf,
+    /// How many clusters.
+    pub amount: Amount,
+    /// How centres follow from their texels.
+    pub centre: CentreRule,
+    /// When to stop.
+    pub limits: Limits,
+    /// First centres are drawn so many times, and the best are taken.
+    pub restarts: u32,
+    /// Seed of the first centres and of the sample.
+    pub seed: u64,
+    /// After this time no pass begins; then the number of passes depends on the machine.
+    pub time: Option<Duration>,
+}
+
+/// A step of a clustering that many processes share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// The first approach, by one process.
+    Prepare,
+    /// One process's share of a pass; the latest where none is named.
+    Assign(Option<usize>, Shard),
+    /// Sums up a pass, by one process: the next one can begin, or the model is done.
+    Reduce(Option<usize>),
+}
+
+/// What a step has done.
+#[derive(Clone, Debug)]
+pub enum Stepped {
+    /// The clustering is done, by this step or before it.
+    Done(Box<Report>),
+    /// This pass can begin.
+    Next(usize),
+    /// Parts of a pass that were found done, and that were assigned.
+    Assigned {
+        /// The pass.
+        pass: usize,
+        /// Found done.
+        found: usize,
+        /// Written by this step.
+        written: usize,
+    },
+    /// A pass that was asked for is over already.
+    Over(usize),
+}
+
+/// How a clustering went.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Clusters, fewer than asked for where there are fewer distinct BRDFs.
+    pub clusters: usize,
+    /// What each pass over all texels found; the last one's objective is the result's.
+    pub passes: Vec<Pass>,
+    /// Why there was no further pass.
+    pub ended: Ended,
+    /// Texels of the sample that the first approach was made on; 0 where all texels went into memory.
+    pub sample_texels: usize,
+    /// Passes over the sample.
+    pub sample_passes: Vec<Pass>,
+    /// What other numbers of clusters left, where one was searched: of the sample, then of all texels.
+    pub trials: Vec<Trial>,
+    /// Mean weighted |dL*| of texels from the representatives of their clusters; only known where all texels were in
+    /// memory (`btf compare` measures it otherwise).
+    pub representative_lightness_error: Option<f64>,
+    /// Mean weighted |dL*| of representatives from their centres.
+    pub representative_from_centre: f64,
+    /// The largest of these.
+    pub representative_from_centre_most: f64,
+    /// Clusters of a single texel.
+    pub single_texel_clusters: usize,
+    /// The model that the clusters were taken from, where they were: its name and the texels that it clustered.
+    pub taken_from: Option<(String, usize)>,
+    /// Bytes of the representatives' samples.
+    pub representative_bytes: u64,
+    /// Bytes of the tile's index.
+    pub index_bytes: u64,
+    /// Bytes of the tile's raw samples.
+    pub tile_bytes: u64,
+    /// Bytes of the whole measurement's raw samples.
+    pub measurement_bytes: u64,
+}
+
+/// Why there was no further pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Ended {
+    /// Nothing moved, or the objective fell by less than the tolerance.
+    Settled,
+    /// There were as many as allowed.
+    Passes,
+    /// The time was over.
+    Time,
+}
+
+impl Ended {
+    fn of(passes: &[Pass], limits: Limits) -> Self {
+        if (Limits { passes: usize::MAX, ..limits }).reached(passes) {
+            Self::Settled
+        } else if passes.len() >= limits.passes {
+            Self::Passes
+        } else {
+            Self::Time
+        }
+    }
+}
+
+/// A clustering, ready to run.
+pub struct Plan {
+    measurement: Measurement,
+    model: Model,
+    tile: Tile,
+    options: Options,
+    arrangement: Arrangement,
+    selection: Selection,
+    /// Clusters that are certain, or that a search may go up to.
+    most_clusters: usize,
+    recipe: Value,
+}
+
+/// Opens the measurement that a model was begun from.
+pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurement> {
+    let measurement = Measurement::open(path)?;
+    let entry = model.stage(Stage::Tile)?.unwrap_or_default();
+    let expected = entry.get("recipe").and_then(|recipe| recipe.get("measurement")).and_then(Value::as_str);
+    if expected.is_some() && expected != Some(measurement.digest()) {
+        return Err(Error::recipe(format!(
+            "{} was cut from another measurement than {}",
+            model.path().display(),
+            path.display()
+        )));
+    }
+    Ok(measurement)
+}
+
+/// Checks options against the tile.
+pub fn plan(options: &Options) -> Result<Plan> {
+    let model = Model::open(&options.model)?;
+    let tile_digest = model.stage_digest(Stage::Tile)?;
+    let measurement = open_measurement_of(&model, &options.measurement)?;
+    let tile = model.tile()?;
+    let description = measurement.description();
+    let most = tile.size.texels().min(MOST_CLUSTERS);
+    let most_clusters = match options.amount {
+        Amount::Clusters(clusters) if (1..=most).contains(&clusters) => clusters,
+        Amount::Clusters(clusters) => {
+            return Err(Error::usage(format!(
+                "{clusters} clusters were asked for, expected 1 to {most} for a tile of {} texels",
+                tile.size.texels()
+            )));
+        }
+        Amount::Error(error) if error > 0.0 => most.min(MOST_SEARCHED),
+        Amount::Ratio(ratio) if ratio > 0.0 => {
+            let brdf = description.bytes() / description.size.texels() as u64;
+            clusters_of_ratio(description.bytes(), brdf, tile.size.texels() as u64, ratio).min(most)
+        }
+        Amount::Error(number) | Amount::Ratio(number) => {
+            return Err(Error::usage(format!("got {number}, expected a number above 0")));
+        }
+    };
+    if most_clusters == 0 {
+        let raw = description.size.texels();
+        return Err(Error::usage(format!(
+            "one BRDF and the index are more than that part of a measurement of {raw} texels"
+        ))
+        .hint("choose a smaller ratio"));
+    }
+    let recipe = json!({
+        "stage": "cluster", "method": METHOD,
+        "tile": tile_digest,
+        "amount": options.amount,
+        "centre": options.centre,
+        "limits": options.limits,
+        "restarts": options.restarts,
+        "seed": options.seed,
+    });
+    let arrangement = Arrangement::new(&description.views, description.lights.len());
+    let selection = Selection::new(&tile.source, description.chunk_side());
+    let options = options.clone();
+    Ok(Plan { measurement, model, tile, options, arrangement, selection, most_clusters, recipe })
+}
+
+/// The most clusters whose BRDFs and index are together `ratio` times smaller than `raw` bytes.
+fn clusters_of_ratio(raw: u64, brdf: u64, texels: u64, ratio: f64) -> usize {
+    let left = |bytes: u64| ((raw as f64 / ratio - bytes as f64).max(0.0) / brdf.max(1) as f64) as usize;
+    let by_bytes = left(texels).min(256);
+    by_bytes.max(left(2 * texels))
+}
+
+impl Plan {
+    /// What would be done.
+    pub fn summary(&self) -> Value {
+        json!({
+            "stage": "cluster",
+            "model": self.options.model,
+            "texels": self.selection.texels(),
+            "clusters_at_most": self.most_clusters,
+            "sample_texels": self.sample_texels(),
+            "in_memory": self.fits_the_sample(),
+            "unit": "part",
+            "units": self.selection.parts().len(),
+            "recipe": self.recipe,
+        })
+    }
+
+    fn method(&self, columns: usize, deadline: Option<Instant>) -> Method {
+        let Options { centre: rule, limits, .. } = self.options;
+        Method { rule, limits, columns, kernel: Kernel::fastest(), deadline }
+    }
+
+    fn deadline(&self) -> Option<Instant> {
+        self.options.time.and_then(|time| Instant::now().checked_add(time))
+    }
+
+    fn passes(&self) -> Result<Passes> {
+        Passes::create(&self.model.path().join(PASSES), &self.recipe)
+    }
+
+    /// Views and lights.
+    fn brdf(&self) -> [usize; 2] {
+        [self.arrangement.cosines().len(), self.arrangement.lights()]
+    }
+
+    /// Clusters the tile, unless that is done.
+    pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
+            return self.model.report(Stage::Cluster);
+        };
+        let deadline = self.deadline();
+        if self.fits_the_sample() {
+            return self.run_in_memory(deadline, context);
+        }
+        let passes = self.passes()?;
+        let (mut pass, mut state) = match passes.latest()? {
+            Some(pass) => (pass, passes.state(pass, self.brdf(), self.selection.texels())?),
+            None => self.prepare(&passes, deadline, context)?,
+        };
+        let mut work = self.work(&state, context)?;
+        loop {
+            match work.run(&passes, pass, &state, deadline, context)? {
+                Next::Pass(next) => (pass, state) = (pass + 1, *next),
+                Next::Restart(history) => {
+                    drop(work);
+                    state = self.approach_more(*history, deadline, context)?;
+                    pass += 1;
+                    passes.write_state(pass, self.brdf(), &state)?;
+                    work = self.work(&state, context)?;
+                }
+                Next::Finished(result) => return self.finish(&result, context),
+            }
+        }
+    }
+
+    fn work(&self, state: &State, context: &Context<'_>) -> Result<Work<'_>> {
+        let [views, lights] = self.brdf();
+        Work::new(self, state.centres.len() / (views * lights), context)
+    }
+
+    /// The first approach: the state that the first pass over all texels begins with.
+    fn prepare(
+        &self,
+        passes: &Passes,
+        deadline: Option<Instant>,
+        context: &Context<'_>,
+    ) -> Result<(usize, State)> {
+        let state = self.approach(deadline, context)?;
+        passes.write_state(0, self.brdf(), &state)?;
+        Ok((0, state))
+    }
+
+    /// Runs one step; many processes may run steps of one clustering.
+    pub fn step(&self, step: Step, context: &Context<'_>) -> Result<Stepped> {
+        if self.model.is_done(Stage::Cluster, &self.recipe)? {
+            return Ok(Stepped::Done(Box::new(self.model.report(Stage::Cluster)?)));
+        }
+        if self.fits_the_sample() {
+            return match step {
+                Step::Prepare => Ok(Stepped::Done(Box::new(self.run(context)?))),
+                _ => Err(Error::missing(format!(
+                    "{}: this tile is clustered by the first step alone",
+                    self.model.path().display()
+                ))
+                .hint("run --step prepare first")),
+            };
+        }
+        let passes = self.passes()?;
+        let latest = passes.latest()?;
+        let begun = |asked: Option<usize>| match latest {
+            Some(latest) if asked.is_none_or(|asked| asked <= latest) => Ok(latest),
+            _ => Err(Error::missing(format!(
+                "{}: pass {} cannot begin yet",
+                self.model.path().display(),
+                asked.unwrap_or(0)
+            ))
+            .hint("run --step prepare first, then --step reduce after each pass")),
+        };
+        match step {
+            Step::Prepare => {
+                let _lock = passes.lock()?;
+                match passes.latest()? {
+                    Some(pass) => Ok(Stepped::Next(pass)),
+                    None => self.prepare(&passes, None, context).map(|(pass, _)| Stepped::Next(pass)),
+                }
+            }
+            Step::Assign(asked, shard) => match begun(asked)? {
+                latest if asked.is_some_and(|asked| asked < latest) => {
+                    Ok(Stepped::Over(asked.unwrap_or(latest)))
+                }
+                pass => self.assign_shard(&passes, pass, shard, context),
+            },
+            Step::Reduce(asked) => {
+                let _lock = passes.lock()?;
+                match begun(asked)? {
+                    latest if asked.is_some_and(|asked| asked < latest) => Ok(Stepped::Next(latest)),
+                    pass => self.reduce(&passes, pass, context),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! A pass over all texels: assigned, counted and forgotten, block by block; then summed up.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::stage::cluster::budget::Budget;
+use crate::stage::cluster::finish::Clustered;
+use crate::stage::cluster::stream::Stream;
+use crate::stage::cluster::{Amount, Plan, Stepped};
+use crate::stage::import::Shard;
+use crate::store::passes::{Found, History, Passes, State};
+use crate::texel::cluster::assign::{Assignment, Texels};
+use crate::texel::cluster::bounds::{Centres, Columns, Guide, Steps};
+use crate::texel::cluster::lloyd::{self, Pass};
+use crate::texel::cluster::nearest::{Farthest, Near, nearer};
+use crate::texel::cluster::search::Trial;
+use crate::texel::cluster::tally::Tally;
+
+/// What follows a pass.
+pub(super) enum Next {
+    /// Another one, which begins with this.
+    Pass(Box<State>),
+    /// A first approach with more clusters: these left too large an error.
+    Restart(Box<History>),
+    /// Nothing.
+    Finished(Box<Clustered>),
+}
+
+/// What one process keeps from pass to pass.
+pub(super) struct Work<'a> {
+    plan: &'a Plan,
+    stream: Stream<'a>,
+    columns_allowed: usize,
+    /// Bounds [slot, column], and what they were made by.
+    bounds: Option<Bounds>,
+}
+
+struct Bounds {
+    columns: Columns,
+    values: Vec<u16>,
+    /// Centres of the last pass, and the texel nearest to each.
+    centres: Vec<u8>,
+    nearest: Vec<Near>,
+}
+
+impl<'a> Work<'a> {
+    /// For passes one after another over all texels.
+    pub(super) fn new(plan: &'a Plan, clusters: usize, context: &Context<'_>) -> Result<Self> {
+        let Budget { columns, kept_blocks, .. } = Budget::of(plan, clusters, context)?;
+        Ok(Self::with(plan, columns, kept_blocks))
+    }
+
+    fn with(plan: &'a Plan, columns_allowed: usize, kept_blocks: usize) -> Self {
+        let stream = Stream::new(&plan.measurement, &plan.arrangement, &plan.selection, kept_blocks);
+        Self { plan, stream, columns_allowed, bounds: None }
+    }
+
+    /// Runs the pass that begins with `state`, writes what the next one begins with, and returns it.
+    pub(super) fn run(
+        &mut self,
+        passes: &Passes,
+        pass: usize,
+        state: &State,
+        deadline: Option<Instant>,
+        context: &Context<'_>,
+    ) -> Result<Next> {
+        let number = state.history.passes.len() + 1;
+        let texels = self.plan.selection.texels();
+        context.progress.begin(&format!("pass {number}"), texels as u64, Counted::Items("texels"));
+        lloyd::tell(&state.history.passes, context);
+        let found = self.assign(0..self.plan.selection.blocks().len(), state, context)?;
+        context.progress.end();
+        self.plan.follow(passes, pass, state, found, deadline)
+    }
+
+    /// Assigns the texels of some blocks to the centres of `state`.
+    fn assign(&mut self, blocks: Range<usize>, state: &State, context: &Context<'_>) -> Result<Found> {
+        let Plan { arrangement, selection, .. } = self.plan;
+        let method = self.plan.method(self.columns_allowed, None);
+        let (rule, kernel) = (method.rule, method.kernel);
+        let centres = arrangement.arranged(&state.centres);
+        let slots = slots_of(self.plan, &blocks);
+        let now = Centres { arrangement, vectors: &centres, kernel };
+        let steps = Steps::of(arrangement);
+        let mut bounds = match self.bounds.take() {
+            Some(bounds) => bounds,
+            None => {
+                let columns = Columns::new(&now, self.columns_allowed);
+                let values = vec![0; slots.len() * columns.count()];
+                Bounds { columns, values, centres: Vec::new(), nearest: Vec::new() }
+            }
+        };
+        // Bounds of nothing yet are of no use; the first pass computes all distances.
+        let guide = (!bounds.centres.is_empty()).then(|| {
+            context.install(|| Guide::new(&now, &bounds.columns, steps, &bounds.centres, &bounds.nearest))
+        });
+        let assignment = Assignment { centres: now, columns: &bounds.columns, steps, guide };
+        let clusters = now.count();
+        let known = !state.index.is_empty();
+        let mut found = Found {
+            index: if known { state.index[slots.clone()].to_vec() } else { vec![0; slots.len()] },
+            tally: Tally::new(rule, clusters, arrangement.stride()),
+            nearest: vec![Near::NONE; clusters],
+            farthest: Farthest::default(),
+            objective: 0,
+            moved: 0,
+        };
+        let columns = bounds.columns.count();
+        let values = &mut bounds.values;
+        let mut distances = Vec::new();
+        self.stream.for_each(blocks, context, |block, vectors| {
+            let here = block.slots.start - slots.start..block.slots.end - slots.start;
+            let numbers = selection.numbers(block.slots.clone());
+            let index = &mut found.index[here.clone()];
+            let before = index.to_vec();
+            distances.resize(index.len(), 0);
+            let nearest = assignment.assign(&mut Texels {
+                vectors,
+                numbers,
+                index,
+                bounds: &mut values[here.start * columns..here.end * columns],
+                distances: &mut distances,
+            });
+            found.tally.add(&centres, vectors, index, kernel);
+            found.nearest = nearer(std::mem::take(&mut found.nearest), nearest);
+            found.objective += distances.iter().sum::<u64>();
+            found.moved +=
+                before.iter().zip(index.iter()).filter(|(before, now)| !known || before != now).count();
+            let texels = distances.iter().zip(numbers);
+            found.farthest.add(texels.map(|(&distance, &texel)| Near { distance, texel }));
+            Ok(())
+        })?;
+        bounds.centres = centres;
+        bounds.nearest = found.nearest.clone();
+        self.bounds = Some(bounds);
+        Ok(found)
+    }
+}
+
+/// The slots of a run of blocks.
+fn slots_of(plan: &Plan, blocks: &Range<usize>) -> Range<usize> {
+    let blocks = &plan.selection.blocks()[blocks.clone()];
+    let start = blocks.first().map_or(0, |block| block.slots.start);
+    start..blocks.last().map_or(start, |block| block.slots.end)
+}
+
+impl Plan {
+    /// Assigns a shard's parts of a pass.
+    pub(super) fn assign_shard(
+        &self,
+        passes: &Passes,
+        pass: usize,
+        shard: Shard,
+        context: &Context<'_>,
+    ) -> Result<Stepped> {
+        let state = passes.state(pass, self.brdf(), self.selection.texels())?;
+        let parts: Vec<usize> = (0..self.selection.parts().len()).filter(|&part| shard.has(part)).collect();
+        let texels: usize = parts.iter().map(|&part| self.selection.slots_of(part).len()).sum();
+        let title = format!("pass {}", state.history.passes.len() + 1);
+        context.progress.begin(&title, texels as u64, Counted::Items("texels"));
+        let (mut found, mut written) = (0, 0);
+        for part in parts {
+            if passes.has_part(pass, part)? {
+                context.progress.advance(self.selection.slots_of(part).len() as u64);
+                found += 1;
+                continue;
+            }
+            // Bounds do not outlive a part: one column is the least.
+            let mut work = Work::with(self, 1, 0);
+            let assigned = work.assign(self.selection.parts()[part].clone(), &state, context)?;
+            passes.write_part(pass, part, &assigned)?;
+            written += 1;
+        }
+        context.progress.end();
+        Ok(Stepped::Assigned { pass, found, written })
+    }
+
+    /// Sums up the parts of a pass.
+    pub(super) fn reduce(&self, passes: &Passes, pass: usize, context: &Context<'_>) -> Result<Stepped> {
+        let state = passes.state(pass, self.brdf(), self.selection.texels())?;
+        let stride = self.arrangement.stride();
+        let mut whole: Option<Found> = None;
+        for part in 0..self.selection.parts().len() {
+            context.check_stop()?;
+            let slots = self.selection.slots_of(part).len();
+            let found = passes.part(pass, part, slots, self.options.centre, stride)?;
+            whole = Some(match whole {
+                None => found,
+                Some(whole) => whole.with(found),
+            });
+        }
+        let whole = whole.ok_or_else(|| Error::internal("a tile without texels"))?;
+        match self.follow(passes, pass, &state, whole, None)? {
+            Next::Pass(_) => Ok(Stepped::Next(pass + 1)),
+            Next::Restart(history) => {
+                let state = self.approach_more(*history, None, context)?;
+                passes.write_state(pass + 1, self.brdf(), &state)?;
+                Ok(Stepped::Next(pass + 1))
+            }
+            Next::Finished(result) => Ok(Stepped::Done(Box::new(self.finish(&result, context)?))),
+        }
+    }
+
+    /// What follows a pass that began with `state`; what the next one begins with is written.
+    fn follow(
+        &self,
+        passes: &Passes,
+        pass: usize,
+        state: &State,
+        found: Found,
+        deadline: Option<Instant>,
+    ) -> Result<Next> {
+        let empty = found.tally.empty_clusters();
+        let reseeded = empty.len().min(found.farthest.texels().len());
+        let texels = self.selection.texels();
+        let mut history = state.history.clone();
+        history.passes.push(Pass::new(&self.arrangement, texels, found.objective, found.moved, reseeded));
+        let mut centres = self.arrangement.arranged(&state.centres);
+        if self.method(0, deadline).is_done(&history.passes) {
+            let error = history.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
+            let clusters = found.nearest.len();
+            let too_large = matches!(self.options.amount, Amount::Error(target) if error > target);
+            if too_large && clusters < self.most_clusters {
+                history.attempts.push(Trial { clusters, mean_lightness_error: error });
+                return Ok(Next::Restart(Box::new(history)));
+            }
+            let index = self.selection.by_number(&found.index);
+            let nearest = found.nearest;
+            return Ok(Next::Finished(Box::new(Clustered {
+                centres,
+                index,
+                nearest,
+                history,
+                from_representatives: None,
+            })));
+        }
+        found.tally.update(&mut centres);
+        let stride = self.arrangement.stride();
+        let farthest: Vec<[u32; 2]> = found.farthest.texels()[..reseeded]
+            .iter()
+            .map(|near| self.tile.source[near.texel as usize])
+            .collect();
+        let vectors = self.read_vectors(&farthest)?;
+        for (cluster, vector) in empty.into_iter().zip(vectors.chunks_exact(stride)) {
+            centres[cluster * stride..(cluster + 1) * stride].copy_from_slice(vector);
+        }
+        let next = State { centres: self.arrangement.plain(&centres), index: found.index, history };
+        passes.write_state(pass + 1, self.brdf(), &next)?;
+        Ok(Next::Pass(Box::new(next)))
+    }
+}

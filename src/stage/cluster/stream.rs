@@ -1,0 +1,114 @@
+//! The vectors of a selection, block by block: read ahead while the block before is worked on, and kept where memory
+//! allows.
+
+use std::ops::Range;
+use std::sync::mpsc::sync_channel;
+
+use rayon::prelude::*;
+
+use crate::error::Result;
+use crate::run::Context;
+use crate::store::measurement::Measurement;
+use crate::texel::cluster::points::Arrangement;
+use crate::texel::cluster::selection::{Block, Selection};
+
+/// Slots that a thread fills at a time.
+const TOGETHER: usize = 64;
+
+/// Blocks of L* codes out of a measurement.
+pub(super) struct Stream<'a> {
+    measurement: &'a Measurement,
+    arrangement: &'a Arrangement,
+    selection: &'a Selection,
+    /// The first blocks, once they have been read.
+    kept: Vec<Option<Vec<u8>>>,
+}
+
+impl<'a> Stream<'a> {
+    /// Keeps the first `kept` blocks in memory once they have been read.
+    pub(super) fn new(
+        measurement: &'a Measurement,
+        arrangement: &'a Arrangement,
+        selection: &'a Selection,
+        kept: usize,
+    ) -> Self {
+        let kept = vec![None; kept.min(selection.blocks().len())];
+        Self { measurement, arrangement, selection, kept }
+    }
+
+    /// Most bytes in flight: a block at work, the next one, and the views that it is put together from.
+    pub(super) fn bytes_in_flight(selection: &Selection, arrangement: &Arrangement) -> usize {
+        let texels = selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(0);
+        let window = selection.blocks().iter().map(|block| block.window.size.texels()).max().unwrap_or(0);
+        2 * texels * arrangement.stride() + window * arrangement.cosines().len() * arrangement.lights()
+    }
+
+    /// Calls `work` with each block of `blocks` and its vectors [slot, stride], in their order, on the pool.
+    pub(super) fn for_each(
+        &mut self,
+        blocks: Range<usize>,
+        context: &Context<'_>,
+        mut work: impl FnMut(&Block, &[u8]) -> Result<()> + Send,
+    ) -> Result<()> {
+        let Self { measurement, arrangement, selection, ref mut kept } = *self;
+        let absent: Vec<usize> =
+            blocks.clone().filter(|&number| !kept.get(number).is_some_and(Option::is_some)).collect();
+        // One block is handed over while the next is read; the channel itself holds none.
+        let (sender, receiver) = sync_channel(0);
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                for number in absent {
+                    let block = &selection.blocks()[number];
+                    let vectors = context
+                        .check_stop()
+                        .and_then(|()| context.install(|| read(measurement, arrangement, selection, block)));
+                    let failed = vectors.is_err();
+                    // Nobody listens any more once the work has failed.
+                    if sender.send(vectors).is_err() || failed {
+                        break;
+                    }
+                }
+            });
+            for number in blocks {
+                context.check_stop()?;
+                let block = &selection.blocks()[number];
+                if let Some(Some(vectors)) = kept.get(number) {
+                    context.install(|| work(block, vectors))?;
+                } else {
+                    let vectors = receiver.recv().unwrap_or_else(|_| Err(crate::Error::stopped()))?;
+                    context.install(|| work(block, &vectors))?;
+                    if let Some(kept) = kept.get_mut(number) {
+                        *kept = Some(vectors);
+                    }
+                }
+                context.progress.advance(block.slots.len() as u64);
+            }
+            drop(receiver);
+            Ok(())
+        })
+    }
+}
+
+/// The vectors of a block [slot, stride].
+fn read(
+    measurement: &Measurement,
+    arrangement: &Arrangement,
+    selection: &Selection,
+    block: &Block,
+) -> Result<Vec<u8>> {
+    let views: Vec<Vec<u8>> = (0..arrangement.cosines().len())
+        .into_par_iter()
+        .map(|view| measurement.read_luminance(view, block.window))
+        .collect::<Result<_>>()?;
+    let stride = arrangement.stride();
+    let places = selection.places(block.slots.clone());
+    let mut vectors = vec![0; places.len() * stride];
+    vectors.par_chunks_mut(TOGETHER * stride).zip(places.par_chunks(TOGETHER)).for_each(
+        |(vectors, places)| {
+            for (vector, &place) in vectors.chunks_exact_mut(stride).zip(places) {
+                arrangement.gather(vector, &views, place as usize);
+            }
+        },
+    );
+    Ok(vectors)
+}

@@ -1,0 +1,260 @@
+//! The state of a clustering on its way: a group for each pass, so that it goes on where it was stopped, and groups of
+//! partial sums, so that many processes can share a pass.
+//!
+//! | array | shape | type |
+//! | --- | --- | --- |
+//! | `pass_<p>/centres` | [cluster, view, light] | u8, the L* codes that pass p assigns to |
+//! | `pass_<p>/index` | [slot] | u16, the assignment that the pass before made; a slot is a texel's place in the order of reading |
+//! | `pass_<p>/part_<n>/index` | [slot] | u16, what pass p assigned in part n |
+//! | `pass_<p>/part_<n>/texels`, `counts` | [cluster], [cluster, count] | u32, what centres follow from |
+//!
+//! The attributes of a group are written last: a group without them is not done.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::error::{Error, Result};
+use crate::store::{Layout, Lock, Store};
+use crate::texel::cluster::centre::CentreRule;
+use crate::texel::cluster::lloyd::Pass;
+use crate::texel::cluster::nearest::{Farthest, Near, nearer};
+use crate::texel::cluster::search::Trial;
+use crate::texel::cluster::tally::Tally;
+
+/// The attribute `kind` of a clustering on its way.
+pub const KIND: &str = "clustering";
+
+/// The passes of a clustering.
+pub struct Passes {
+    store: Store,
+}
+
+/// What a pass begins with.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Centres [cluster, view, light].
+    pub centres: Vec<u8>,
+    /// The assignment that the pass before made, by slot; none before the first pass.
+    pub index: Vec<u16>,
+    /// How it came here.
+    pub history: History,
+}
+
+/// How a clustering went before a pass.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct History {
+    /// Passes over all texels.
+    pub passes: Vec<Pass>,
+    /// Texels of the first approach.
+    pub sample_texels: usize,
+    /// Passes over these.
+    pub sample_passes: Vec<Pass>,
+    /// What numbers of clusters left of these, where one was searched.
+    pub trials: Vec<Trial>,
+    /// What numbers of clusters left of all texels that were too few.
+    pub attempts: Vec<Trial>,
+}
+
+/// What a pass found in a part of the texels, or in all.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// The assignment, by slot.
+    pub index: Vec<u16>,
+    /// What the centres follow from.
+    pub tally: Tally,
+    /// The texel nearest to each centre.
+    pub nearest: Vec<Near>,
+    /// The texels farthest from theirs.
+    pub farthest: Farthest,
+    /// Sum of the distances.
+    pub objective: u64,
+    /// Texels that changed their cluster.
+    pub moved: usize,
+}
+
+impl Found {
+    /// Together with what was found in the part that follows.
+    #[must_use]
+    pub fn with(mut self, next: Self) -> Self {
+        self.index.extend(next.index);
+        self.tally.merge(&next.tally);
+        self.nearest = nearer(self.nearest, next.nearest);
+        self.farthest.add(next.farthest.texels().iter().copied());
+        self.objective += next.objective;
+        self.moved += next.moved;
+        self
+    }
+}
+
+/// What the attributes of a part hold of a [`Found`].
+#[derive(Serialize, Deserialize)]
+struct PartAttributes {
+    nearest: Vec<Near>,
+    farthest: Vec<Near>,
+    objective: u64,
+    moved: usize,
+}
+
+fn pass_name(pass: usize) -> String {
+    format!("pass_{pass:04}")
+}
+
+fn part_name(pass: usize, part: usize) -> String {
+    format!("{}/part_{part:05}", pass_name(pass))
+}
+
+impl Passes {
+    /// Begins the passes of a recipe at `path`, or goes on with them.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Recipe`] where another recipe's lie there.
+    pub fn create(path: &Path, recipe: &Value) -> Result<Self> {
+        let store = Store::at(path);
+        store.begin_by_recipe(KIND, recipe, json!({}))?;
+        Ok(Self { store })
+    }
+
+    /// Removes all of it.
+    pub fn remove(path: &Path) -> Result<()> {
+        match std::fs::remove_dir_all(path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io("remove", path, error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Waits until no other process prepares or sums up.
+    pub fn lock(&self) -> Result<Lock> {
+        self.store.lock("-step")
+    }
+
+    /// The latest pass that can begin.
+    pub fn latest(&self) -> Result<Option<usize>> {
+        let entries = match std::fs::read_dir(self.store.path()) {
+            Ok(entries) => entries,
+            Err(error) => return Err(Error::io("list", self.store.path(), error)),
+        };
+        let number = |name: &str| name.strip_prefix("pass_")?.parse::<usize>().ok();
+        let mut passes: Vec<usize> =
+            entries.flatten().filter_map(|entry| number(&entry.file_name().to_string_lossy())).collect();
+        passes.sort_unstable();
+        for &pass in passes.iter().rev() {
+            if self.attributes::<History>(&pass_name(pass))?.is_some() {
+                return Ok(Some(pass));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What a pass begins with; `brdf` are its views and lights.
+    pub fn state(&self, pass: usize, brdf: [usize; 2], slots: usize) -> Result<State> {
+        let name = pass_name(pass);
+        let history = self.attributes(&name)?.ok_or_else(|| {
+            Error::missing(format!("{}: {name} is not there yet", self.store.path().display()))
+                .hint("sum up the pass before it first: --step reduce")
+        })?;
+        let (_, centres) = self.store.read::<u8>(&format!("{name}/centres"), &[0, brdf[0], brdf[1]])?;
+        let clusters = centres.len() / (brdf[0] * brdf[1]);
+        let history: History = history;
+        let index = if history.passes.is_empty() {
+            Vec::new()
+        } else {
+            self.store.read::<u16>(&format!("{name}/index"), &[slots])?.1
+        };
+        if index.iter().any(|&cluster| usize::from(cluster) >= clusters) {
+            return Err(self.damaged(&name, "a cluster beyond the last"));
+        }
+        Ok(State { centres, index, history })
+    }
+
+    /// Writes what a pass begins with, and removes what the passes before it left.
+    pub fn write_state(&self, pass: usize, brdf: [usize; 2], state: &State) -> Result<()> {
+        let name = pass_name(pass);
+        let shape = [state.centres.len() / (brdf[0] * brdf[1]), brdf[0], brdf[1]];
+        let layout = Layout::small::<u8>(&["cluster", "view", "light"], &shape);
+        self.store.write(&format!("{name}/centres"), &layout, &state.centres)?;
+        if !state.history.passes.is_empty() {
+            let layout = Layout::small::<u16>(&["slot"], &[state.index.len()]);
+            self.store.write(&format!("{name}/index"), &layout, &state.index)?;
+        }
+        self.write_attributes(&name, &state.history)?;
+        match pass {
+            0 => Ok(()),
+            _ => Self::remove(&self.store.path().join(pass_name(pass - 1))),
+        }
+    }
+
+    /// Whether a part of a pass is done.
+    pub fn has_part(&self, pass: usize, part: usize) -> Result<bool> {
+        Ok(self.attributes::<PartAttributes>(&part_name(pass, part))?.is_some())
+    }
+
+    /// What a pass found in a part of `slots` slots.
+    pub fn part(
+        &self,
+        pass: usize,
+        part: usize,
+        slots: usize,
+        rule: CentreRule,
+        stride: usize,
+    ) -> Result<Found> {
+        let name = part_name(pass, part);
+        let PartAttributes { nearest, farthest, objective, moved } =
+            self.attributes(&name)?.ok_or_else(|| {
+                Error::missing(format!("{}: {name} is not there yet", self.store.path().display()))
+                    .hint("run the shards that are missing: --step assign")
+            })?;
+        let (_, index) = self.store.read::<u16>(&format!("{name}/index"), &[slots])?;
+        let (_, texels) = self.store.read::<u32>(&format!("{name}/texels"), &[nearest.len()])?;
+        let (_, counts) = self.store.read::<u32>(&format!("{name}/counts"), &[nearest.len(), 0])?;
+        let whole = texels.iter().map(|&texels| u64::from(texels)).sum::<u64>() == slots as u64
+            && index.iter().all(|&cluster| usize::from(cluster) < nearest.len());
+        let tally = Tally::from_parts(rule, stride, texels, counts).filter(|_| whole);
+        let tally = tally.ok_or_else(|| self.damaged(&name, "its arrays do not fit together"))?;
+        Ok(Found { index, tally, nearest, farthest: Farthest::of(farthest), objective, moved })
+    }
+
+    /// Writes what a pass found in a part.
+    pub fn write_part(&self, pass: usize, part: usize, found: &Found) -> Result<()> {
+        let name = part_name(pass, part);
+        let (texels, counts) = found.tally.parts();
+        let layout = Layout::small::<u16>(&["slot"], &[found.index.len()]);
+        self.store.write(&format!("{name}/index"), &layout, &found.index)?;
+        let layout = Layout::small::<u32>(&["cluster"], &[texels.len()]);
+        self.store.write(&format!("{name}/texels"), &layout, texels)?;
+        let layout =
+            Layout::small::<u32>(&["cluster", "count"], &[texels.len(), counts.len() / texels.len()]);
+        self.store.write(&format!("{name}/counts"), &layout, counts)?;
+        let attributes = PartAttributes {
+            nearest: found.nearest.clone(),
+            farthest: found.farthest.texels().to_vec(),
+            objective: found.objective,
+            moved: found.moved,
+        };
+        self.write_attributes(&name, &attributes)
+    }
+
+    fn write_attributes(&self, group: &str, attributes: &impl Serialize) -> Result<()> {
+        match serde_json::to_value(attributes) {
+            Ok(Value::Object(attributes)) => self.store.write_group(group, attributes),
+            _ => Err(Error::internal("attributes that are no JSON object")),
+        }
+    }
+
+    /// The attributes of a group; `None` where it is not done.
+    fn attributes<T: DeserializeOwned>(&self, group: &str) -> Result<Option<T>> {
+        let Some(found) = self.store.group(group)? else { return Ok(None) };
+        serde_json::from_value(Value::Object(found))
+            .map(Some)
+            .map_err(|error| self.damaged(group, &error.to_string()))
+    }
+
+    fn damaged(&self, group: &str, what: &str) -> Error {
+        Error::input(format!("{}: {group}: {what}", self.store.path().display()))
+            .hint("delete this folder and run the command that made it again")
+    }
+}

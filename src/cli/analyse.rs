@@ -46,6 +46,9 @@ struct ClusterOptions {
     /// Least relative gain of the objective that is worth another pass
     #[arg(long, default_value_t = 1e-4)]
     tolerance: f64,
+    /// Texels to cluster in memory before all others are passed over [default: as many as 192 MiB hold]
+    #[arg(long, value_name = "TEXELS")]
+    sample: Option<usize>,
     /// Draw first centres so many times and go on with the best
     #[arg(long, default_value_t = 1, value_name = "N")]
     restarts: u32,
@@ -53,7 +56,7 @@ struct ClusterOptions {
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile holds this one
-    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "restarts", "time"])]
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "sample", "restarts", "time"])]
     clusters_of: Option<PathBuf>,
 }
 
@@ -378,6 +381,7 @@ fn cluster_plan(
         amount,
         centre,
         limits,
+        sample: options.sample,
         restarts: options.restarts,
         seed,
         time: options.time.map(Duration::from_secs),

@@ -204,6 +204,7 @@ fn analyse(
             model: model.clone(),
             amount: Amount::Clusters(settings.clusters),
             centre: CentreRule::Median,
+            sample: None,
             restarts: 1,
             time: None,
             limits: Limits { passes: settings.passes, tolerance: settings.tolerance },

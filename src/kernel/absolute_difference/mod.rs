@@ -99,6 +99,20 @@ impl Kernel {
         distances
     }
 
+    /// The distance of a texel to a centre if it is below `limit`; groups after the sum has reached that are not read.
+    pub fn distance_below(self, point: &[u8], centre: &[u8], groups: &[Group], limit: u64) -> Option<u64> {
+        let mut distance = 0;
+        for group in groups {
+            let range = group.start..group.end;
+            let [sum] = self.row(&point[range.clone()], [&centre[range]]);
+            distance += u64::from(group.weight) * u64::from(sum);
+            if distance >= limit {
+                return None;
+            }
+        }
+        Some(distance)
+    }
+
     fn tile(self, points: [&[u8]; TILE], centres: [&[u8]; TILE]) -> [[u32; TILE]; TILE] {
         match self {
             Self::Plain => points.map(|point| plain(point, centres)),
@@ -177,6 +191,11 @@ mod tests {
                     let centre = n.min(centres - 1);
                     &centres_bytes[centre * stride..(centre + 1) * stride]
                 });
+                for (limit, below) in [(expected[0], None), (expected[0] + 1, Some(expected[0]))] {
+                    let found =
+                        kernel.distance_below(&points[..stride], &centres_bytes[..stride], &groups, limit);
+                    assert_eq!(found, below, "{kernel:?}");
+                }
                 let found = kernel.row_distances(&points[..stride], four, &groups);
                 assert_eq!(found[..centres.min(4)], expected[..centres.min(4)], "{kernel:?}");
             }

@@ -9,7 +9,7 @@ use crate::texel::cluster::tally::Tally;
 /// The program itself, and what allocators keep.
 const PROGRAM_BYTES: usize = 48 << 20;
 
-/// Most bytes of the sample's vectors. Fixed, so that a result does not depend on memory.
+/// Most bytes of the sample's vectors, unless told otherwise. Fixed, so that a result does not depend on memory.
 const SAMPLE_BYTES: usize = 192 << 20;
 
 /// Texels whose distances to all centres a thread holds.
@@ -30,7 +30,16 @@ pub(super) struct Budget {
 impl Plan {
     /// Texels of the sample.
     pub(super) fn sample_texels(&self) -> usize {
-        (SAMPLE_BYTES / self.arrangement.stride()).min(self.selection.texels())
+        let affordable = SAMPLE_BYTES / self.arrangement.stride();
+        self.options.sample.unwrap_or(affordable).max(self.least_sample()).min(self.selection.texels())
+    }
+
+    /// No fewer texels than clusters that are asked for.
+    fn least_sample(&self) -> usize {
+        match self.options.amount {
+            Amount::Clusters(_) | Amount::Ratio(_) => self.most_clusters,
+            Amount::Error(_) => 1,
+        }
     }
 
     /// Whether the sample is all texels.

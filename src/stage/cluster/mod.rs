@@ -70,6 +70,9 @@ pub struct Options {
     pub centre: CentreRule,
     /// When to stop.
     pub limits: Limits,
+    /// Texels that are clustered in memory: all of a tile of no more, a sample of a larger one. Where absent, as many as
+    /// 192 MiB hold.
+    pub sample: Option<usize>,
     /// First centres are drawn so many times, and the best are taken.
     pub restarts: u32,
     /// Seed of the first centres and of the sample.
@@ -235,6 +238,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         "amount": options.amount,
         "centre": options.centre,
         "limits": options.limits,
+        "sample": options.sample,
         "restarts": options.restarts,
         "seed": options.seed,
     });

@@ -93,7 +93,13 @@ impl Assignment<'_> {
     }
 
     /// By the distances that bounds do not rule out.
-    fn assign_guided(&self, guide: &Guide, texels: &mut Texels<'_>, nearest: &mut [Near], scratch: &mut Scratch) {
+    fn assign_guided(
+        &self,
+        guide: &Guide,
+        texels: &mut Texels<'_>,
+        nearest: &mut [Near],
+        scratch: &mut Scratch,
+    ) {
         let Scratch { suspects, found, .. } = scratch;
         let Centres { arrangement, kernel, .. } = self.centres;
         let columns = self.columns;

@@ -1,7 +1,7 @@
-//! First centres by k-means++ on the distance of (1) (Arthur and Vassilvitskii 2007; for the L1
-//! objective a texel is drawn in proportion to its distance, not its square).
+//! First centres by greedy k-means++ on the distance of (1): each is the best of a few texels drawn in proportion to
+//! their distance from the centres before it (Arthur and Vassilvitskii 2007; for the L1 objective not its square).
 //!
-//! A distance that the triangle inequality rules out is not computed (Raff 2021); the draw is the same.
+//! A distance that the triangle inequality rules out is not computed (Raff 2021); the result is the same.
 
 use rayon::prelude::*;
 
@@ -11,14 +11,31 @@ use crate::random::Hash;
 use crate::run::Context;
 use crate::texel::cluster::points::Points;
 
+/// Texels drawn for each centre.
+const CANDIDATES: u32 = 8;
+
+/// Texels that they are drawn from, or so many for each centre: of more, a subset without preference.
+const TEXELS: usize = 8192;
+const TEXELS_OF_A_CENTRE: usize = 8;
+
 /// Texels that a thread takes at a time.
 const BLOCK: usize = 256;
 
 /// A texel's nearest centre so far.
 #[derive(Clone, Copy)]
 struct Own {
+    texel: u32,
     distance: u64,
     centre: u32,
+}
+
+/// What a texel would gain, were it a centre.
+struct Candidate {
+    texel: u32,
+    /// Texels, by their place among those drawn from, that it would lie nearer to than their own centres, and how near.
+    nearer: Vec<(u32, u64)>,
+    /// By how much it would lower the objective.
+    gain: u64,
 }
 
 /// Draws `count` texels as first centres; fewer where there are fewer distinct BRDFs. The first of them are those
@@ -31,57 +48,106 @@ pub fn draw(
     kernel: Kernel,
     context: &Context<'_>,
 ) -> Result<Vec<u32>> {
-    let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
     let hash = Hash::new(seed, u32::from_be_bytes(*b"seed"));
-    let mut chosen = vec![hash.below(points.len() as u64, 0, attempt, 0) as u32];
-    let mut vectors = points.vector(chosen[0] as usize).to_vec();
-    let mut own = vec![Own { distance: u64::MAX, centre: 0 }; points.len()];
-    let mut between = vec![0];
-    while chosen.len() < count {
-        context.check_stop()?;
-        lower(points, &vectors, &between, kernel, &mut own);
-        let total: u64 = own.par_iter().map(|own| own.distance).sum();
-        if total == 0 {
-            break;
+    let texels = subset(points.len(), TEXELS.max(TEXELS_OF_A_CENTRE * count), seed, attempt);
+    let first = hash.below(texels.len() as u64, 0, attempt, 0) as usize;
+    let (mut chosen, mut vectors) = (Vec::new(), Vec::new());
+    let mut own: Vec<Own> =
+        texels.into_iter().map(|texel| Own { texel, distance: u64::MAX, centre: 0 }).collect();
+    let mut best = Candidate::all(points, &[own[first].texel], &vectors, kernel, &own);
+    loop {
+        // The first of the best, so that the order of candidates decides between equals.
+        let Some(candidate) = best.into_iter().rev().max_by_key(|candidate| candidate.gain) else {
+            return Ok(chosen);
+        };
+        for &(place, distance) in &candidate.nearer {
+            let own = &mut own[place as usize];
+            (own.distance, own.centre) = (distance, chosen.len() as u32);
         }
-        let mut left = hash.below(total, chosen.len() as u32, attempt, 0);
-        let drawn = own.iter().position(|own| {
-            let hit = left < own.distance;
-            left = left.wrapping_sub(if hit { 0 } else { own.distance });
-            hit
-        });
-        let Some(texel) = drawn else { break };
-        let latest = points.vector(texel);
-        between = vec![0; chosen.len()];
-        kernel.distances(latest, &vectors, stride, groups, &mut between);
-        between.push(0);
-        vectors.extend_from_slice(latest);
-        chosen.push(texel as u32);
+        vectors.extend_from_slice(points.vector(candidate.texel as usize));
+        chosen.push(candidate.texel);
         context.progress.advance(1);
+        context.check_stop()?;
+        let sums: Vec<u64> =
+            own.par_chunks(BLOCK).map(|own| own.iter().map(|own| own.distance).sum()).collect();
+        let total: u64 = sums.iter().sum();
+        if chosen.len() >= count || total == 0 {
+            return Ok(chosen);
+        }
+        let place = |candidate| hash.below(total, chosen.len() as u32, attempt, candidate);
+        let drawn: Vec<u32> =
+            (0..CANDIDATES).map(|candidate| texel_at(&own, &sums, place(candidate))).collect();
+        best = Candidate::all(points, &drawn, &vectors, kernel, &own);
     }
-    Ok(chosen)
 }
 
-/// Lowers each texel's distance to that to the latest centre; `between` are that centre's distances to all centres.
-fn lower(points: &Points, centres: &[u8], between: &[u64], kernel: Kernel, own: &mut [Own]) {
-    let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
-    let latest = between.len() - 1;
-    let centre = &centres[latest * stride..];
-    points.vectors.par_chunks(BLOCK * stride).zip(own.par_chunks_mut(BLOCK)).for_each(|(vectors, own)| {
-        // The distance to the latest centre is at least the way between the centres less that to the own one.
-        let near = |own: &Own| own.distance == u64::MAX || between[own.centre as usize] < 2 * own.distance;
-        let near: Vec<usize> = (0..own.len()).filter(|&texel| near(&own[texel])).collect();
-        for four in near.chunks(4) {
-            let texels = std::array::from_fn(|n| {
-                let texel = four[n.min(four.len() - 1)];
-                &vectors[texel * stride..(texel + 1) * stride]
-            });
-            let distances: [u64; 4] = kernel.row_distances(centre, texels, groups);
-            for (&texel, distance) in four.iter().zip(distances) {
-                if distance < own[texel].distance {
-                    own[texel] = Own { distance, centre: latest as u32 };
-                }
-            }
+/// The texel in whose distance `place` lies, all distances laid end to end; `sums` are those of blocks.
+fn texel_at(own: &[Own], sums: &[u64], mut place: u64) -> u32 {
+    let mut passes = |length: u64| {
+        let beyond = place >= length;
+        place -= if beyond { length } else { 0 };
+        beyond
+    };
+    let block = sums.iter().take_while(|&&sum| passes(sum)).count();
+    let within = own[block * BLOCK..].iter().take_while(|own| passes(own.distance)).count();
+    own[block * BLOCK + within].texel
+}
+
+/// `count` of `all` texels without preference, in ascending order; all where there are no more.
+pub(super) fn subset(all: usize, count: usize, seed: u64, attempt: u32) -> Vec<u32> {
+    let hash = Hash::new(seed, u32::from_be_bytes(*b"smpl"));
+    let mut drawn: Vec<(u32, u32)> =
+        (0..all as u32).map(|texel| (hash.words(texel, attempt, 0)[0], texel)).collect();
+    if count < drawn.len() {
+        drawn.select_nth_unstable(count);
+        drawn.truncate(count);
+    }
+    let mut texels: Vec<u32> = drawn.into_iter().map(|(_, texel)| texel).collect();
+    texels.sort_unstable();
+    texels
+}
+
+impl Candidate {
+    /// What each of these texels would gain. They are looked at together, so that each vector is fetched once.
+    fn all(points: &Points, drawn: &[u32], centres: &[u8], kernel: Kernel, own: &[Own]) -> Vec<Self> {
+        let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
+        let count = centres.len() / stride;
+        let vectors = points.vectors_of(drawn);
+        let mut between = vec![0; drawn.len() * count];
+        if count > 0 {
+            kernel.distances(&vectors, centres, stride, groups, &mut between);
         }
-    });
+        let none = || vec![Vec::new(); drawn.len()];
+        let nearer: Vec<Vec<(u32, u64)>> = own
+            .par_chunks(BLOCK)
+            .enumerate()
+            .fold(none, |mut nearer, (block, own)| {
+                for (own, place) in own.iter().zip(block * BLOCK..) {
+                    let point = points.vector(own.texel as usize);
+                    for (candidate, nearer) in nearer.iter_mut().enumerate() {
+                        // The distance to the candidate is at least the way between the centres less that to the
+                        // own one.
+                        let way = between.get(candidate * count + own.centre as usize);
+                        if way.is_none_or(|&way| way < 2 * own.distance) {
+                            let vector = &vectors[candidate * stride..(candidate + 1) * stride];
+                            let below = kernel.distance_below(point, vector, groups, own.distance);
+                            nearer.extend(below.map(|distance| (place as u32, distance)));
+                        }
+                    }
+                }
+                nearer
+            })
+            .reduce(none, |mut first, second| {
+                first.iter_mut().zip(second).for_each(|(first, second)| first.extend(second));
+                first
+            });
+        let gain = |nearer: &[(u32, u64)]| {
+            // Before there is a centre the distances are without end, and there is one candidate.
+            nearer.iter().fold(0u64, |gain, &(place, distance)| {
+                gain.wrapping_add(own[place as usize].distance - distance)
+            })
+        };
+        let candidates = drawn.iter().zip(nearer);
+        candidates.map(|(&texel, nearer)| Self { texel, gain: gain(&nearer), nearer }).collect()
+    }
 }

@@ -4,14 +4,17 @@
 
 use std::ops::Range;
 
-use crate::random::Hash;
 use crate::shape::{Size, Window};
+use crate::texel::cluster::seeding::subset;
 
 /// Most texels of a block.
 const BLOCK_TEXELS: usize = 4096;
 
-/// Texels after which a part is complete.
-const PART_TEXELS: usize = 1 << 16;
+/// Parts are about this many.
+const PARTS: usize = 16;
+
+/// Tells the draw of the sample from those of first centres.
+const SAMPLE: u32 = u32::MAX;
 
 /// Texels that lie side by side and are read at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,10 +66,11 @@ impl Selection {
             selection.blocks.push(Block { window, slots: start..start + block.len() });
             start += block.len();
         }
+        let part_texels = sources.len().div_ceil(PARTS);
         let (mut first, mut texels) = (0, 0);
         for (number, block) in selection.blocks.iter().enumerate() {
             texels += block.slots.len();
-            if texels >= PART_TEXELS || number + 1 == selection.blocks.len() {
+            if texels >= part_texels || number + 1 == selection.blocks.len() {
                 selection.parts.push(first..number + 1);
                 (first, texels) = (number + 1, 0);
             }
@@ -108,16 +112,7 @@ impl Selection {
 
     /// `count` texels drawn without preference, as ascending texel numbers; all where there are no more.
     pub fn sample(&self, count: usize, seed: u64) -> Vec<u32> {
-        let hash = Hash::new(seed, u32::from_be_bytes(*b"smpl"));
-        let mut drawn: Vec<(u32, u32)> =
-            (0..self.texels() as u32).map(|number| (hash.words(number, 0, 0)[0], number)).collect();
-        if count < drawn.len() {
-            drawn.select_nth_unstable(count);
-            drawn.truncate(count);
-        }
-        let mut numbers: Vec<u32> = drawn.into_iter().map(|(_, number)| number).collect();
-        numbers.sort_unstable();
-        numbers
+        subset(self.texels(), count, seed, SAMPLE)
     }
 
     /// Puts what lies by slots in the order of texel numbers.
@@ -133,6 +128,7 @@ impl Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Hash;
 
     #[test]
     fn every_texel_is_found_once_at_its_place() {
@@ -165,7 +161,7 @@ mod tests {
         let slots: Vec<Range<usize>> =
             (0..selection.parts().len()).map(|part| selection.slots_of(part)).collect();
         assert_eq!((slots[0].start, slots[slots.len() - 1].end), (0, size.texels()));
-        assert!(slots[..slots.len() - 1].iter().all(|slots| slots.len() >= PART_TEXELS));
+        assert!(slots[..slots.len() - 1].iter().all(|slots| slots.len() >= size.texels() / PARTS));
         assert!(slots.windows(2).all(|pair| pair[0].end == pair[1].start));
         let sample = selection.sample(10_000, 7);
         assert_eq!(sample.len(), 10_000);

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::store::{Layout, Lock, Store};
+use crate::store::{Layout, Store};
 use crate::texel::cluster::centre::CentreRule;
 use crate::texel::cluster::lloyd::Pass;
 use crate::texel::cluster::nearest::{Farthest, Near, nearer};
@@ -125,11 +125,6 @@ impl Passes {
             }
             _ => Ok(()),
         }
-    }
-
-    /// Waits until no other process prepares or sums up.
-    pub fn lock(&self) -> Result<Lock> {
-        self.store.lock("-step")
     }
 
     /// The latest pass that can begin.

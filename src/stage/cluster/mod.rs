@@ -338,12 +338,19 @@ impl Plan {
 
     /// Runs one step; many processes may run steps of one clustering.
     pub fn step(&self, step: Step, context: &Context<'_>) -> Result<Stepped> {
-        if self.model.is_done(Stage::Cluster, &self.recipe)? {
-            return Ok(Stepped::Done(Box::new(self.model.report(Stage::Cluster)?)));
-        }
+        let done = || Ok(Stepped::Done(Box::new(self.model.report(Stage::Cluster)?)));
+        // One process prepares or sums up at a time; no result depends on it.
+        let _lock = match step {
+            Step::Assign(..) if self.model.is_done(Stage::Cluster, &self.recipe)? => return done(),
+            Step::Assign(..) => None,
+            Step::Prepare | Step::Reduce(_) => match self.model.begin(Stage::Cluster, &self.recipe)? {
+                Some(lock) => Some(lock),
+                None => return done(),
+            },
+        };
         if self.fits_the_sample() {
             return match step {
-                Step::Prepare => Ok(Stepped::Done(Box::new(self.run(context)?))),
+                Step::Prepare => Ok(Stepped::Done(Box::new(self.run_in_memory(None, context)?))),
                 _ => Err(Error::missing(format!(
                     "{}: this tile is clustered by the first step alone",
                     self.model.path().display()
@@ -363,26 +370,20 @@ impl Plan {
             .hint("run --step prepare first, then --step reduce after each pass")),
         };
         match step {
-            Step::Prepare => {
-                let _lock = passes.lock()?;
-                match passes.latest()? {
-                    Some(pass) => Ok(Stepped::Next(pass)),
-                    None => self.prepare(&passes, None, context).map(|(pass, _)| Stepped::Next(pass)),
-                }
-            }
+            Step::Prepare => match latest {
+                Some(pass) => Ok(Stepped::Next(pass)),
+                None => self.prepare(&passes, None, context).map(|(pass, _)| Stepped::Next(pass)),
+            },
             Step::Assign(asked, shard) => match begun(asked)? {
                 latest if asked.is_some_and(|asked| asked < latest) => {
                     Ok(Stepped::Over(asked.unwrap_or(latest)))
                 }
                 pass => self.assign_shard(&passes, pass, shard, context),
             },
-            Step::Reduce(asked) => {
-                let _lock = passes.lock()?;
-                match begun(asked)? {
-                    latest if asked.is_some_and(|asked| asked < latest) => Ok(Stepped::Next(latest)),
-                    pass => self.reduce(&passes, pass, context),
-                }
-            }
+            Step::Reduce(asked) => match begun(asked)? {
+                latest if asked.is_some_and(|asked| asked < latest) => Ok(Stepped::Next(latest)),
+                pass => self.reduce(&passes, pass, context),
+            },
         }
     }
 }

@@ -4,7 +4,8 @@
 #![allow(clippy::expect_used)]
 
 use btfkit::color::{LightnessCodes, Transfer};
-use btfkit::kernel::absolute_difference::Kernel;
+use btfkit::kernel::Kernel;
+use btfkit::kernel::counting::{STRIP, lower_medians};
 use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
@@ -46,13 +47,13 @@ fn normals(count: u32, salt: u32) -> Vec<[f32; 3]> {
     (0..count).map(normal).collect()
 }
 
-/// Distances of (1): 64 texels to 64 centres.
+/// Distances of (1): 64 texels to 256 centres, in tiles.
 #[divan::bench(args = Kernel::available())]
 fn distances(bencher: Bencher<'_, '_>, kernel: Kernel) {
     let arrangement = arrangement();
-    let (points, centres) = (bytes(64 * arrangement.stride(), 0), bytes(64 * arrangement.stride(), 1));
-    let mut found = vec![0; 64 * 64];
-    bencher.counter(ItemsCount::new(64usize * 64)).bench_local(|| {
+    let (points, centres) = (bytes(64 * arrangement.stride(), 0), bytes(256 * arrangement.stride(), 1));
+    let mut found = vec![0; 64 * 256];
+    bencher.counter(ItemsCount::new(64usize * 256)).bench_local(|| {
         kernel.distances(
             black_box(&points),
             &centres,
@@ -60,6 +61,39 @@ fn distances(bencher: Bencher<'_, '_>, kernel: Kernel) {
             arrangement.groups(),
             black_box(&mut found),
         );
+    });
+}
+
+/// The same, each texel and centre by themselves.
+#[divan::bench(args = Kernel::available())]
+fn distances_one_by_one(bencher: Bencher<'_, '_>, kernel: Kernel) {
+    let arrangement = arrangement();
+    let stride = arrangement.stride();
+    let (points, centres) = (bytes(64 * stride, 0), bytes(256 * stride, 1));
+    bencher.counter(ItemsCount::new(64usize * 256)).bench_local(|| {
+        let mut sum = 0;
+        for point in black_box(&points).chunks_exact(stride) {
+            for centre in centres.chunks_exact(stride) {
+                let [distance] = kernel.row_distances(point, [centre], arrangement.groups());
+                sum += distance;
+            }
+        }
+        sum
+    });
+}
+
+/// Medians of 76 texels, as many as a cluster has of 256 in a tile of 137x142.
+#[divan::bench(args = Kernel::available())]
+fn medians(bencher: Bencher<'_, '_>, kernel: Kernel) {
+    let bytes = bytes(76 * 6784, 2);
+    let strips = bytes.as_chunks::<STRIP>().0;
+    let mut medians = [0; STRIP];
+    bencher.counter(BytesCount::new(76usize * 6784)).bench_local(|| {
+        for strip in 0..6784 / STRIP {
+            let rows: Vec<&[u8; STRIP]> = (0..76).map(|row| &strips[row * (6784 / STRIP) + strip]).collect();
+            lower_medians(kernel, black_box(&rows), &mut medians);
+        }
+        medians
     });
 }
 

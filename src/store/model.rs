@@ -123,6 +123,7 @@ impl Model {
     /// Where it has been run by another recipe.
     pub fn begin(&self, stage: Stage, recipe: &Value) -> Result<Option<Lock>> {
         let lock = self.store.lock(&format!("-{}", stage.name()))?;
+        self.store.sweep()?;
         Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
     }
 

@@ -117,14 +117,10 @@ impl Passes {
         Ok(Self { store })
     }
 
-    /// Removes all of it.
-    pub fn remove(path: &Path) -> Result<()> {
-        match std::fs::remove_dir_all(path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(Error::io("remove", path, error))
-            }
-            _ => Ok(()),
-        }
+    /// Removes all of it, as far as no other process is writing there: what is left is never read again, and
+    /// removed by whoever comes next.
+    pub fn remove(path: &Path) {
+        let _ = std::fs::remove_dir_all(path);
     }
 
     /// The latest pass that can begin.
@@ -177,10 +173,10 @@ impl Passes {
             self.store.write(&format!("{name}/index"), &layout, &state.index)?;
         }
         self.write_attributes(&name, &state.history)?;
-        match pass {
-            0 => Ok(()),
-            _ => Self::remove(&self.store.path().join(pass_name(pass - 1))),
+        for before in 0..pass {
+            Self::remove(&self.store.path().join(pass_name(before)));
         }
+        Ok(())
     }
 
     /// Whether a part of a pass is done.

@@ -74,7 +74,7 @@ impl Plan {
             measurement_bytes: description.bytes(),
         };
         self.model.finish(Stage::Cluster, &self.recipe, &report)?;
-        Passes::remove(&self.model.path().join(PASSES))?;
+        Passes::remove(&self.model.path().join(PASSES));
         Ok(report)
     }
 

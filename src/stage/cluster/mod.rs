@@ -292,7 +292,7 @@ impl Plan {
     /// Clusters the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
-            return self.model.report(Stage::Cluster);
+            return self.done();
         };
         let deadline = self.deadline();
         if self.fits_the_sample() {
@@ -319,6 +319,12 @@ impl Plan {
         }
     }
 
+    /// How the clustering that is done went. A process that was killed at its end leaves its passes behind.
+    fn done(&self) -> Result<Report> {
+        Passes::remove(&self.model.path().join(PASSES));
+        self.model.report(Stage::Cluster)
+    }
+
     fn work(&self, state: &State, context: &Context<'_>) -> Result<Work<'_>> {
         let [views, lights] = self.brdf();
         Work::new(self, state.centres.len() / (views * lights), context)
@@ -338,7 +344,7 @@ impl Plan {
 
     /// Runs one step; many processes may run steps of one clustering.
     pub fn step(&self, step: Step, context: &Context<'_>) -> Result<Stepped> {
-        let done = || Ok(Stepped::Done(Box::new(self.model.report(Stage::Cluster)?)));
+        let done = || Ok(Stepped::Done(Box::new(self.done()?)));
         // One process prepares or sums up at a time; no result depends on it.
         let _lock = match step {
             Step::Assign(..) if self.model.is_done(Stage::Cluster, &self.recipe)? => return done(),

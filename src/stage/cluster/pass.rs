@@ -1,7 +1,7 @@
 //! A pass over all texels: assigned, counted and forgotten, block by block; then summed up.
 
 use std::ops::Range;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
 use crate::run::Context;
@@ -36,6 +36,8 @@ pub(super) struct Work<'a> {
     columns_allowed: usize,
     /// Bounds [slot, column], and what they were made by.
     bounds: Option<Bounds>,
+    /// What the last pass took.
+    pass_time: Option<Duration>,
 }
 
 struct Bounds {
@@ -55,7 +57,7 @@ impl<'a> Work<'a> {
 
     fn with(plan: &'a Plan, columns_allowed: usize, kept_blocks: usize) -> Self {
         let stream = Stream::new(&plan.measurement, &plan.arrangement, &plan.selection, kept_blocks);
-        Self { plan, stream, columns_allowed, bounds: None }
+        Self { plan, stream, columns_allowed, bounds: None, pass_time: None }
     }
 
     /// Runs the pass that begins with `state`, writes what the next one begins with, and returns it.
@@ -70,8 +72,10 @@ impl<'a> Work<'a> {
         let number = state.history.passes.len() + 1;
         let texels = self.plan.selection.texels();
         context.progress.begin(&format!("pass {number}"), texels as u64, Counted::Items("texels"));
-        lloyd::tell(&state.history.passes, context);
+        lloyd::tell(&state.history.passes, self.plan.options.limits, self.pass_time, context);
+        let start = Instant::now();
         let found = self.assign(0..self.plan.selection.blocks().len(), state, context)?;
+        self.pass_time = Some(start.elapsed());
         context.progress.end();
         self.plan.follow(passes, pass, state, found, deadline)
     }

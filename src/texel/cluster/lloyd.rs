@@ -1,6 +1,6 @@
 //! Passes of assignment and update over texels in memory, until nothing is gained.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -49,14 +49,14 @@ impl Pass {
     }
 }
 
-/// Tells the last pass beside the bar.
-pub fn tell(passes: &[Pass], context: &Context<'_>) {
-    if let Some(Pass { mean_lightness_error, moved, .. }) = passes.last() {
-        let number = passes.len();
-        context
-            .progress
-            .remark(&format!("pass {number}: mean |dL*| {mean_lightness_error:.4}, {moved} texels moved"));
-    }
+/// Tells the last pass beside the bar, and how many may follow; `each` is the time that one takes, where it is known.
+pub fn tell(passes: &[Pass], limits: Limits, each: Option<Duration>, context: &Context<'_>) {
+    let Some(Pass { mean_lightness_error, moved, .. }) = passes.last() else { return };
+    let (number, left) = (passes.len(), limits.passes_left(passes));
+    let time = each.map_or(String::new(), |each| format!(", {:.0} s", each.as_secs_f64() * left as f64));
+    context.progress.remark(&format!(
+        "pass {number}: mean |dL*| {mean_lightness_error:.4}, {moved} texels moved; about {left} passes{time} to go"
+    ));
 }
 
 impl Limits {
@@ -69,6 +69,16 @@ impl Limits {
             last.reseeded == 0 && (last.moved == 0 || gain < self.tolerance)
         });
         settled || passes.len() >= self.passes
+    }
+
+    /// How many passes may follow: gains are taken to go on shrinking as the last two did.
+    pub fn passes_left(&self, passes: &[Pass]) -> usize {
+        let most = self.passes.saturating_sub(passes.len());
+        let gain = |n: usize| 1.0 - passes[n].objective as f64 / (passes[n - 1].objective as f64).max(1.0);
+        let Some(last) = passes.len().checked_sub(1).filter(|&last| last >= 2) else { return most };
+        let (now, shrink) = (gain(last), (gain(last) / gain(last - 1)).ln());
+        let left = (self.tolerance.max(f64::MIN_POSITIVE) / now).ln() / shrink;
+        if shrink < 0.0 && left >= 0.0 { (left.ceil() as usize).min(most) } else { most }
     }
 }
 
@@ -159,7 +169,7 @@ pub fn run(points: &Points, first: Vec<u8>, method: Method, context: &Context<'_
         };
         let reseeded = empty.len().min(farthest.texels().len());
         passes.push(Pass::new(arrangement, points.len(), distances.iter().sum(), moved, reseeded));
-        tell(&passes, context);
+        tell(&passes, method.limits, None, context);
         if method.is_done(&passes) {
             return Ok(Clustering { centres, index, nearest, passes });
         }
@@ -248,6 +258,17 @@ mod tests {
                 assert_eq!(nearest.distance, distance(&points, best, centre));
             }
         }
+    }
+
+    #[test]
+    fn passes_to_go_follow_from_how_gains_shrink() {
+        let pass = |objective| Pass { mean_lightness_error: 0.0, objective, moved: 1, reseeded: 0 };
+        let limits = Limits { passes: 50, tolerance: 1e-3 };
+        let passes = [pass(1_000_000), pass(900_000), pass(855_000), pass(833_625)]; // gains of 0.1, 0.05, 0.025
+        assert_eq!(limits.passes_left(&passes), 5); // 0.025 / 2^5 < 0.001
+        assert_eq!(limits.passes_left(&passes[..2]), 48);
+        assert_eq!(Limits { passes: 6, ..limits }.passes_left(&passes), 2);
+        assert_eq!(limits.passes_left(&[pass(10), pass(10), pass(10)]), 47);
     }
 
     #[test]

@@ -426,12 +426,9 @@ fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let how = taken.map_or(format!("after {} passes", report.passes.len()), |(name, texels)| {
         format!("of {name}, where {texels} texels were clustered")
     });
-    let represented = report
-        .representative_lightness_error
-        .map_or(String::new(), |error| format!(", {error:.3} from representatives"));
     tell.line(format!(
-        "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres{represented}",
-        report.clusters
+        "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
+        report.clusters, report.representative_lightness_error
     ));
     tell.line(format!(
         "          representatives {:.3} from their centres, at most {:.3}; {} clusters of one texel",

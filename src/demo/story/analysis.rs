@@ -83,7 +83,7 @@ pub(super) fn clusters(figures: &Figures) -> Section {
         report.clusters,
         report.passes.len(),
         report.single_texel_clusters,
-        report.representative_lightness_error.unwrap_or(f64::NAN)
+        report.representative_lightness_error
     );
     let shots = vec![
         shot(

@@ -28,17 +28,10 @@ impl Plan {
         let from_representatives =
             context.install(|| total_distance(&points, &representatives, &clustering.index, method.kernel));
         drop(points);
-        let history = History { passes: clustering.passes, trials, ..History::default() };
-        self.finish(
-            &Clustered {
-                centres: clustering.centres,
-                index: clustering.index,
-                nearest: clustering.nearest,
-                history,
-                from_representatives: Some(from_representatives),
-            },
-            context,
-        )
+        let Clustering { centres, index, nearest, passes } = clustering;
+        let history = History { passes, trials, ..History::default() };
+        let clustered = Clustered { centres, index, nearest, history };
+        self.finish(&clustered, &representatives, from_representatives, context)
     }
 
     /// What the first pass over all texels begins with.

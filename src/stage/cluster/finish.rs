@@ -24,20 +24,29 @@ pub(super) struct Clustered {
     pub(super) nearest: Vec<Near>,
     /// How it came here.
     pub(super) history: History,
-    /// Sum of the distances of all texels from the representatives of their clusters, where it is known.
-    pub(super) from_representatives: Option<u64>,
 }
 
 impl Plan {
-    /// Writes the arrays of the model, then how it went.
-    pub(super) fn finish(&self, clustered: &Clustered, context: &Context<'_>) -> Result<Report> {
+    /// Rows and columns of the representatives in the measurement.
+    pub(super) fn sources(&self, clustered: &Clustered) -> Vec<[u32; 2]> {
+        clustered.nearest.iter().map(|near| self.tile.source[near.texel as usize]).collect()
+    }
+
+    /// Writes the arrays of the model, then how it went. `codes` are the vectors of the representatives, and
+    /// `from_representatives` is the sum of the distances of all texels from those of their clusters.
+    pub(super) fn finish(
+        &self,
+        clustered: &Clustered,
+        codes: &[u8],
+        from_representatives: u64,
+        context: &Context<'_>,
+    ) -> Result<Report> {
         let description = self.measurement.description();
         let Clustered { centres, index, nearest, history, .. } = clustered;
         let clusters = nearest.len();
-        let sources: Vec<[u32; 2]> =
-            nearest.iter().map(|near| self.tile.source[near.texel as usize]).collect();
+        let sources = self.sources(clustered);
         let representatives = self.read_representatives(&sources, context)?;
-        let codes = self.arrangement.plain(&self.read_vectors(&sources)?);
+        let codes = self.arrangement.plain(codes);
         let arrays = Clusters {
             size: self.tile.size,
             index: index.clone(),
@@ -61,9 +70,7 @@ impl Plan {
             sample_texels: history.sample_texels,
             sample_passes: history.sample_passes.clone(),
             trials: history.trials.iter().chain(&history.attempts).copied().collect(),
-            representative_lightness_error: clustered
-                .from_representatives
-                .map(|distance| lightness(distance) / texels as f64),
+            representative_lightness_error: lightness(from_representatives) / texels as f64,
             representative_from_centre: from_centres.iter().sum::<f64>() / clusters as f64,
             representative_from_centre_most: from_centres.iter().copied().fold(0.0, f64::max),
             single_texel_clusters: population.iter().filter(|&&n| n == 1).count(),

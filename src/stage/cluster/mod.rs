@@ -127,9 +127,8 @@ pub struct Report {
     pub sample_passes: Vec<Pass>,
     /// What other numbers of clusters left, where one was searched: of the sample, then of all texels.
     pub trials: Vec<Trial>,
-    /// Mean weighted |dL*| of texels from the representatives of their clusters; only known where all texels were in
-    /// memory (`btf compare` measures it otherwise).
-    pub representative_lightness_error: Option<f64>,
+    /// Mean weighted |dL*| of texels from the representatives of their clusters.
+    pub representative_lightness_error: f64,
     /// Mean weighted |dL*| of representatives from their centres.
     pub representative_from_centre: f64,
     /// The largest of these.
@@ -314,7 +313,7 @@ impl Plan {
                     passes.write_state(pass, self.brdf(), &state)?;
                     work = self.work(&state, context)?;
                 }
-                Next::Finished(result) => return self.finish(&result, context),
+                Next::Finished(result) => return work.finish(&result, context),
             }
         }
     }

@@ -3,13 +3,15 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
-use crate::stage::cluster::{Amount, Plan, Stepped};
+use crate::stage::cluster::{Amount, Plan, Report, Stepped};
 use crate::stage::import::Shard;
 use crate::store::passes::{Found, History, Passes, State};
 use crate::texel::cluster::assign::{Assignment, Texels};
@@ -144,6 +146,30 @@ impl<'a> Work<'a> {
     }
 }
 
+impl Work<'_> {
+    /// Writes the model. What the representatives leave takes the texels once more: only now are they known.
+    pub(super) fn finish(&mut self, clustered: &Clustered, context: &Context<'_>) -> Result<Report> {
+        let Plan { arrangement, selection, .. } = self.plan;
+        let kernel = self.plan.method(0, None).kernel;
+        let (stride, groups) = (arrangement.stride(), arrangement.groups());
+        let vectors = self.plan.read_vectors(&self.plan.sources(clustered))?;
+        let blocks = 0..selection.blocks().len();
+        context.progress.begin("representatives", selection.texels() as u64, Counted::Items("texels"));
+        let mut total = 0;
+        self.stream.for_each(blocks, context, |block, points| {
+            let numbers = selection.numbers(block.slots.clone());
+            let distances = points.par_chunks_exact(stride).zip(numbers).map(|(point, &number)| {
+                let cluster = usize::from(clustered.index[number as usize]);
+                kernel.row_distances(point, [&vectors[cluster * stride..][..stride]], groups)[0]
+            });
+            total += distances.sum::<u64>();
+            Ok(())
+        })?;
+        context.progress.end();
+        self.plan.finish(clustered, &vectors, total, context)
+    }
+}
+
 /// The slots of a run of blocks.
 fn slots_of(plan: &Plan, blocks: &Range<usize>) -> Range<usize> {
     let blocks = &plan.selection.blocks()[blocks.clone()];
@@ -204,7 +230,9 @@ impl Plan {
                 passes.write_state(pass + 1, self.brdf(), &state)?;
                 Ok(Stepped::Next(pass + 1))
             }
-            Next::Finished(result) => Ok(Stepped::Done(Box::new(self.finish(&result, context)?))),
+            Next::Finished(result) => {
+                Ok(Stepped::Done(Box::new(Work::with(self, 1, 0).finish(&result, context)?)))
+            }
         }
     }
 
@@ -233,13 +261,7 @@ impl Plan {
             }
             let index = self.selection.by_number(&found.index);
             let nearest = found.nearest;
-            return Ok(Next::Finished(Box::new(Clustered {
-                centres,
-                index,
-                nearest,
-                history,
-                from_representatives: None,
-            })));
+            return Ok(Next::Finished(Box::new(Clustered { centres, index, nearest, history })));
         }
         found.tally.update(&mut centres);
         let stride = self.arrangement.stride();

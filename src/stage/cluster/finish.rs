@@ -86,12 +86,12 @@ impl Plan {
     }
 
     /// The vectors [texel, stride] of texels at these rows and columns of the measurement.
-    pub(super) fn read_vectors(&self, sources: &[[u32; 2]]) -> Result<Vec<u8>> {
+    pub(super) fn read_vectors(&self, sources: &[[u32; 2]], context: &Context<'_>) -> Result<Vec<u8>> {
         let stride = self.arrangement.stride();
         let mut vectors = vec![0; sources.len() * stride];
         for (window, wanted) in self.by_chunk(sources) {
             for view in 0..self.brdf()[0] {
-                let codes = self.measurement.read_luminance(view, window)?;
+                let codes = context.install(|| self.measurement.read_luminance(view, window))?;
                 for &(number, place) in &wanted {
                     let lights = self.arrangement.lights();
                     let codes = &codes[place * lights..(place + 1) * lights];
@@ -113,7 +113,7 @@ impl Plan {
         let by_view: Vec<Vec<Samples>> = units::for_each(context, &numbers, context.threads, |&view| {
             let mut brdfs = vec![Samples::none(description.sample_type); sources.len()];
             for (window, wanted) in &windows {
-                let read = self.measurement.read_reflectance(view, *window)?;
+                let read = context.install(|| self.measurement.read_reflectance(view, *window))?;
                 for &(number, place) in wanted {
                     brdfs[number] = read
                         .select(std::iter::once(place * texel..(place + 1) * texel))

@@ -79,7 +79,7 @@ impl<'a> Work<'a> {
         let found = self.assign(0..self.plan.selection.blocks().len(), state, context)?;
         self.pass_time = Some(start.elapsed());
         context.progress.end();
-        self.plan.follow(passes, pass, state, found, deadline)
+        self.plan.follow(passes, pass, state, found, deadline, context)
     }
 
     /// Assigns the texels of some blocks to the centres of `state`.
@@ -94,7 +94,7 @@ impl<'a> Work<'a> {
         let mut bounds = match self.bounds.take() {
             Some(bounds) => bounds,
             None => {
-                let columns = Columns::new(&now, self.columns_allowed);
+                let columns = context.install(|| Columns::new(&now, self.columns_allowed));
                 let values = vec![0; slots.len() * columns.count()];
                 Bounds { columns, values, centres: Vec::new(), nearest: Vec::new() }
             }
@@ -152,7 +152,7 @@ impl Work<'_> {
         let Plan { arrangement, selection, .. } = self.plan;
         let kernel = self.plan.method(0, None).kernel;
         let (stride, groups) = (arrangement.stride(), arrangement.groups());
-        let vectors = self.plan.read_vectors(&self.plan.sources(clustered))?;
+        let vectors = self.plan.read_vectors(&self.plan.sources(clustered), context)?;
         let blocks = 0..selection.blocks().len();
         context.progress.begin("representatives", selection.texels() as u64, Counted::Items("texels"));
         let mut total = 0;
@@ -223,7 +223,7 @@ impl Plan {
             });
         }
         let whole = whole.ok_or_else(|| Error::internal("a tile without texels"))?;
-        match self.follow(passes, pass, &state, whole, None)? {
+        match self.follow(passes, pass, &state, whole, None, context)? {
             Next::Pass(_) => Ok(Stepped::Next(pass + 1)),
             Next::Restart(history) => {
                 let state = self.approach_more(*history, None, context)?;
@@ -244,6 +244,7 @@ impl Plan {
         state: &State,
         found: Found,
         deadline: Option<Instant>,
+        context: &Context<'_>,
     ) -> Result<Next> {
         let empty = found.tally.empty_clusters();
         let reseeded = empty.len().min(found.farthest.texels().len());
@@ -269,7 +270,7 @@ impl Plan {
             .iter()
             .map(|near| self.tile.source[near.texel as usize])
             .collect();
-        let vectors = self.read_vectors(&farthest)?;
+        let vectors = self.read_vectors(&farthest, context)?;
         for (cluster, vector) in empty.into_iter().zip(vectors.chunks_exact(stride)) {
             centres[cluster * stride..(cluster + 1) * stride].copy_from_slice(vector);
         }

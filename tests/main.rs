@@ -7,6 +7,8 @@ mod archives;
 mod bad_input;
 #[path = "behaviour/check.rs"]
 mod check;
+#[path = "behaviour/curve.rs"]
+mod curve;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
 #[path = "behaviour/equations.rs"]

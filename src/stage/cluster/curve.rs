@@ -67,7 +67,8 @@ pub struct CurvePoint {
 /// A curve, ready to be made.
 pub struct Plan {
     clustering: ClusterPlan,
-    most: usize,
+    /// Numbers of clusters, ascending.
+    numbers: Vec<usize>,
 }
 
 /// Checks options against the tile.
@@ -92,23 +93,27 @@ pub fn plan(options: &Options) -> Result<Plan> {
     })?;
     let sample = clustering.sample_texels();
     let most = options.most.min((sample / TEXELS_OF_A_CLUSTER).max(2)).min(sample);
-    Ok(Plan { clustering, most })
+    // No more are drawn than the last number takes.
+    let numbers = numbers(most);
+    Ok(Plan { clustering, numbers })
 }
 
 impl Plan {
     /// Clusters the sample by 1, 2, 4 ... first ones of the same seeds.
     pub fn run(&self, context: &Context<'_>) -> Result<Curve> {
-        let Self { clustering: plan, most } = self;
-        let budget = Budget::of(plan, *most, context).map_err(|error| match error.guidance() {
+        let Self { clustering: plan, numbers } = self;
+        let most = numbers.last().copied().unwrap_or(1);
+        let budget = Budget::of(plan, most, context).map_err(|error| match error.guidance() {
             Some(_) => error.hint("choose a larger --memory or a smaller --most"),
             None => error,
         })?;
         let sample = plan.read_sample(context)?;
         let mut trials = Trials::new(&sample, plan.method(budget.sample_columns, None), plan.options.seed);
-        context.progress.begin("draw centres", *most as u64, Counted::Items("centres"));
-        let drawn = context.install(|| trials.draw(*most, context))?;
+        context.progress.begin("draw centres", most as u64, Counted::Items("centres"));
+        let drawn = context.install(|| trials.draw(most, context))?;
         context.progress.end();
-        let numbers: Vec<usize> = numbers(drawn);
+        // Where there are fewer distinct BRDFs, the numbers beyond them are left out.
+        let numbers: Vec<usize> = numbers.iter().copied().filter(|&number| number <= drawn).collect();
         context.progress.begin("curve", numbers.len() as u64, Counted::Items("clusterings"));
         for clusters in numbers {
             context.install(|| trials.run(clusters, context))?;

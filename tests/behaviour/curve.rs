@@ -26,11 +26,11 @@ fn a_curve_falls_is_drawn_and_leaves_the_model_as_it_is() {
     assert!(errors[6] < 0.5 * errors[0] && errors[6] > 0.0, "{errors:?}");
     // Of 9 x 19 images in three 8-bit channels, each cluster; and a byte a texel of the tile.
     let texels = told["tile_texels"].as_f64().unwrap();
-    let raw = (56 * 48 * 9 * 19 * 3) as f64;
+    let raw = f64::from(56 * 48 * 9 * 19 * 3);
     for (clusters, (bytes, ratio)) in
         column("clusters").iter().zip(column("bytes").into_iter().zip(column("ratio")))
     {
-        assert_eq!(bytes, clusters * (9 * 19 * 3) as f64 + texels);
+        assert_eq!(bytes, clusters * f64::from(9 * 19 * 3) + texels);
         assert!((ratio * bytes / raw - 1.0).abs() < 1e-12);
     }
 

@@ -9,6 +9,8 @@ mod bad_input;
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/curve.rs"]
+mod curve;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
 #[path = "behaviour/equations.rs"]

@@ -2,6 +2,7 @@
 
 mod analyse;
 mod check;
+mod curve;
 mod demo;
 mod enlarge;
 mod export;
@@ -84,6 +85,7 @@ enum Command {
     Model(analyse::Whole),
     Tile(analyse::Tile),
     Cluster(analyse::Cluster),
+    Curve(curve::Curve),
     Normals(analyse::Normals),
     Fit(analyse::Fit),
     Compare(analyse::Compare),
@@ -138,6 +140,7 @@ impl Command {
             Self::Model(command) => command.run(context, tell),
             Self::Tile(command) => command.run(context, tell),
             Self::Cluster(command) => command.run(context, tell),
+            Self::Curve(command) => command.run(context, tell),
             Self::Normals(command) => command.run(context, tell),
             Self::Fit(command) => command.run(context, tell),
             Self::Compare(command) => command.run(context, tell),

@@ -1,5 +1,7 @@
 //! Pictures: linear values or false colours, written as PNG (display) or EXR (values).
 
+pub mod chart;
+pub mod drawing;
 pub mod false_color;
 
 use std::path::Path;

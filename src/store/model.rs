@@ -373,8 +373,13 @@ impl Clusters {
 
     /// Bytes of the tile's index.
     pub fn index_bytes(&self) -> u64 {
-        self.index.len() as u64 * if self.sources.len() <= 256 { 1 } else { 2 }
+        index_bytes(self.index.len(), self.sources.len())
     }
+}
+
+/// Bytes of an index of so many texels into so many clusters.
+pub fn index_bytes(texels: usize, clusters: usize) -> u64 {
+    texels as u64 * if clusters <= 256 { 1 } else { 2 }
 }
 
 /// Measured colour BRDFs, one a cluster.

@@ -1,10 +1,9 @@
 //! What was measured on one sheet: brightness of all images, what in it neighbours do not promise, the normals.
 
-use font8x8::UnicodeFonts;
-
 use super::exposure;
 use super::finding::{Finding, round};
 use super::statistics::Statistics;
+use crate::picture::drawing::Canvas;
 use crate::picture::{Picture, false_color};
 use crate::shape::Size;
 use crate::texel::stereo::Stereo;
@@ -19,7 +18,6 @@ const LINE: usize = 14;
 /// Largest jump in the map of outliers, natural logarithm: half of again or two thirds of the light.
 const LARGEST_JUMP: f64 = 0.4;
 
-const INK: [f32; 3] = [0.1, 0.1, 0.12];
 const MARK: [f32; 3] = [0.95, 0.1, 0.75];
 
 /// The sheet. Findings are marked in the map of outliers.
@@ -39,7 +37,7 @@ pub fn sheet(statistics: &Statistics, findings: &[&Finding]) -> Picture {
             if column == 1 { widths[0] } else { 0 },
         );
     }
-    Picture::display(canvas.size, canvas.pixels)
+    canvas.into_picture()
 }
 
 /// A picture with a caption above, a line of explanation below and numbers at its sides.
@@ -95,41 +93,6 @@ impl Panel {
         for line in &self.below {
             canvas.text(below, x, line);
             below += LINE;
-        }
-    }
-}
-
-/// A sheet of paper.
-struct Canvas {
-    size: Size,
-    pixels: Vec<[f32; 3]>,
-}
-
-impl Canvas {
-    fn new(size: Size) -> Self {
-        Self { size, pixels: vec![[1.0; 3]; size.texels()] }
-    }
-
-    fn set(&mut self, y: usize, x: usize, color: [f32; 3]) {
-        if y < self.size.height && x < self.size.width {
-            self.pixels[y * self.size.width + x] = color;
-        }
-    }
-
-    fn put(&mut self, top: usize, left: usize, picture: &Picture) {
-        for (n, &pixel) in picture.pixels.iter().enumerate() {
-            self.set(top + n / picture.size.width, left + n % picture.size.width, pixel);
-        }
-    }
-
-    fn text(&mut self, top: usize, left: usize, text: &str) {
-        for (number, character) in text.chars().enumerate() {
-            let Some(glyph) = font8x8::BASIC_FONTS.get(character) else { continue };
-            for (y, row) in glyph.iter().enumerate() {
-                for x in (0..8).filter(|x| row >> x & 1 == 1) {
-                    self.set(top + y, left + 8 * number + x, INK);
-                }
-            }
         }
     }
 }

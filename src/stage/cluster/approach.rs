@@ -125,7 +125,7 @@ impl Plan {
     }
 
     /// Reads the texels of the sample, in the order of their numbers.
-    fn read_sample(&self, context: &Context<'_>) -> Result<Points> {
+    pub(super) fn read_sample(&self, context: &Context<'_>) -> Result<Points> {
         let sample = self.selection.sample(self.sample_texels(), self.options.seed);
         let stride = self.arrangement.stride();
         let mut vectors = vec![0; sample.len() * stride];

@@ -6,6 +6,7 @@
 
 mod approach;
 mod budget;
+pub mod curve;
 mod finish;
 mod pass;
 mod stream;

@@ -38,11 +38,18 @@ impl<'a> Trials<'a> {
         self.found
     }
 
-    /// Clusters by `clusters` seeds, or as many as there are distinct BRDFs.
-    pub fn run(&mut self, clusters: usize, context: &Context<'_>) -> Result<Clustering> {
+    /// Draws `clusters` seeds, or as many as there are distinct BRDFs: how many there are then. All clusterings by no
+    /// more begin with the first of these.
+    pub fn draw(&mut self, clusters: usize, context: &Context<'_>) -> Result<usize> {
         if self.seeds.len() < clusters {
             self.seeds = seeding::draw(self.points, clusters, self.seed, 0, self.method.kernel, context)?;
         }
+        Ok(self.seeds.len())
+    }
+
+    /// Clusters by `clusters` seeds, or as many as there are distinct BRDFs.
+    pub fn run(&mut self, clusters: usize, context: &Context<'_>) -> Result<Clustering> {
+        self.draw(clusters, context)?;
         let clusters = clusters.min(self.seeds.len());
         let first = self.points.vectors_of(&self.seeds[..clusters]);
         let clustering = lloyd::run(self.points, first, self.method, context)?;

@@ -1,0 +1,83 @@
+use std::path::PathBuf;
+
+use btfkit::error::{Error, Result};
+use btfkit::picture::Ending;
+use btfkit::run::Context;
+use btfkit::stage::cluster::curve;
+use btfkit::texel::cluster::centre::CentreRule;
+use btfkit::texel::cluster::lloyd::Limits;
+use clap::Args;
+
+use super::table::{row, table};
+use super::{Tell, bytes_text};
+
+/// Show what error each number of clusters leaves and what compression it gives
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf tile wood.zarr wood.model.zarr && btf curve wood.zarr wood.model.zarr
+  btf curve wood.zarr wood.model.zarr --most 256 --out curve.png
+  btf curve wood.zarr wood.model.zarr --json > curve.json
+For 1, 2, 4 ... clusters: the weighted mean |dL*| of texels from their centres, the bytes of representatives and index,
+and how many times smaller they are than the raw measurement. Of a tile that 192 MiB do not hold, a sample is
+clustered. The model stays as it is; choose a number, then run btf cluster --clusters N.")]
+pub(super) struct Curve {
+    /// The measurement
+    measurement: PathBuf,
+    /// The model with the tile
+    model: PathBuf,
+    /// Also draw a chart, .png
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Print the curve as JSON
+    #[arg(long)]
+    json: bool,
+    /// Most clusters; never more than a quarter of the texels
+    #[arg(long, default_value_t = 1024, value_name = "N")]
+    most: usize,
+    /// Seed of the first centres and of the sample
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+}
+
+impl Curve {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        self.out.as_deref().map(Ending::of).transpose()?;
+        let plan = curve::plan(&curve::Options {
+            measurement: self.measurement.clone(),
+            model: self.model.clone(),
+            most: self.most,
+            // As btf cluster does unless told otherwise.
+            centre: CentreRule::Median,
+            limits: Limits { passes: 50, tolerance: 1e-4 },
+            seed: self.seed,
+        })?;
+        let curve = plan.run(context)?;
+        if self.json {
+            let value = serde_json::to_value(&curve).map_err(|error| Error::internal(error.to_string()))?;
+            tell.plan(&value)?;
+        } else {
+            tell_curve(&curve, tell);
+        }
+        if let Some(path) = &self.out {
+            curve.chart().draw().write(path)?;
+        }
+        Ok(())
+    }
+}
+
+fn tell_curve(curve: &curve::Curve, tell: Tell) {
+    let mut rows = vec![row!["clusters", "mean |dL*|", "size", "of raw measurement"]];
+    for point in &curve.points {
+        rows.push(row![
+            point.clusters,
+            format!("{:.3}", point.mean_lightness_error),
+            bytes_text(point.bytes),
+            curve::ratio_text(point.ratio)
+        ]);
+    }
+    tell.line(table(&rows));
+    if curve.sample_texels < curve.tile_texels {
+        tell.line(format!("of a sample of {} of {} texels", curve.sample_texels, curve.tile_texels));
+    }
+}

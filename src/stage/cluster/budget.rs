@@ -7,7 +7,7 @@ use crate::stage::cluster::{Amount, Plan};
 use crate::texel::cluster::tally::Tally;
 
 /// The program itself, and what allocators keep.
-const PROGRAM_BYTES: usize = 48 << 20;
+const PROGRAM_BYTES: usize = 64 << 20;
 
 /// Most bytes of the sample's vectors, unless told otherwise. Fixed, so that a result does not depend on memory.
 const SAMPLE_BYTES: usize = 192 << 20;

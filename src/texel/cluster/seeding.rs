@@ -15,7 +15,7 @@ use crate::texel::cluster::points::Points;
 const CANDIDATES: u32 = 8;
 
 /// Texels that they are drawn from, or so many for each centre: of more, a subset without preference.
-const TEXELS: usize = 8192;
+const TEXELS: usize = 16384;
 const TEXELS_OF_A_CENTRE: usize = 8;
 
 /// Texels that a thread takes at a time.

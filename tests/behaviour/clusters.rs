@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use btfkit::stage::cluster::Report;
+use btfkit::stage::cluster::{Ended, Report};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::{Model, Stage};
 use btfkit::texel::cluster::points::Arrangement;
@@ -210,4 +210,16 @@ fn a_tile_takes_the_clusters_of_its_plane() {
     let other = plane(folder.path(), "other");
     assert!(fail(&mut take(&other, &tile), 2).contains("is not in the tile"));
     fail(&mut cluster(&tile), 65);
+}
+
+#[test]
+fn time_that_is_over_ends_a_clustering_after_a_pass() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, sample) in [("memory", "99999"), ("streamed", "200")] {
+        let model = plane(folder.path(), name);
+        let options = ["--clusters", "20", "--sample", sample, "--time", "0"];
+        succeed(btf().arg("cluster").args([&fixture().measurement(), &model]).args(options));
+        let report = report(&model);
+        assert_eq!((report.passes.len(), report.ended), (1, Ended::Time));
+    }
 }

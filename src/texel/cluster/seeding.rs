@@ -39,7 +39,7 @@ struct Candidate {
 }
 
 /// Draws `count` texels as first centres; fewer where there are fewer distinct BRDFs. The first of them are those
-/// that a smaller `count` gives. Each `attempt` is another draw.
+/// that a smaller `count` gives, as long as both are drawn from as many texels. Each `attempt` is another draw.
 pub fn draw(
     points: &Points,
     count: usize,
@@ -149,5 +149,71 @@ impl Candidate {
         };
         let candidates = drawn.iter().zip(nearer);
         candidates.map(|(&texel, nearer)| Self { texel, gain: gain(&nearer), nearer }).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::run::progress::Silent;
+    use crate::texel::cluster::points::Arrangement;
+    use btfkit_formats::Direction;
+    use std::sync::atomic::AtomicBool;
+
+    fn points(texels: u32) -> Points {
+        let views: Vec<_> = (0..3).map(|v| Direction::from_degrees(30.0 * f64::from(v), 0.0)).collect();
+        let arrangement = Arrangement::new(&views, 5);
+        let hash = Hash::new(8, 0);
+        let mut vectors = vec![0; texels as usize * arrangement.stride()];
+        for view in 0..3 {
+            let code = |n: u32| {
+                (hash.words(n / 5 % 40, view, n % 5)[0] % 200 + hash.words(n, view, 9)[0] % 20) as u8
+            };
+            arrangement.insert_view(
+                &mut vectors,
+                view as usize,
+                &(0..texels * 5).map(code).collect::<Vec<u8>>(),
+            );
+        }
+        Points { arrangement, vectors }
+    }
+
+    #[test]
+    fn what_is_ruled_out_changes_no_draw() {
+        let points = points(700);
+        let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
+        let distances = |texel: u32| {
+            let mut distances = vec![0; points.len()];
+            let vector = points.vector(texel as usize);
+            Kernel::Plain.distances(&points.vectors, vector, stride, groups, &mut distances);
+            distances
+        };
+        let stop = AtomicBool::new(false);
+        let context = Context::new(&Silent, &stop, 2, 1 << 30).unwrap();
+        let drawn = draw(&points, 30, 5, 2, Kernel::fastest(), &context).unwrap();
+        assert_eq!(drawn[..12], draw(&points, 12, 5, 2, Kernel::Plain, &context).unwrap());
+        assert_ne!(drawn, draw(&points, 30, 5, 3, Kernel::Plain, &context).unwrap());
+        // The same by all distances.
+        let hash = Hash::new(5, u32::from_be_bytes(*b"seed"));
+        let mut own = distances(drawn[0]);
+        for (number, &found) in drawn.iter().enumerate().skip(1) {
+            let total: u64 = own.iter().sum();
+            let candidates = (0..CANDIDATES).map(|candidate| {
+                let mut place = hash.below(total, number as u32, 2, candidate);
+                let texel = own.iter().position(|&distance| {
+                    let hit = place < distance;
+                    place -= if hit { 0 } else { distance };
+                    hit
+                });
+                texel.unwrap() as u32
+            });
+            let lowered = |texel: u32| -> Vec<u64> {
+                own.iter().zip(distances(texel)).map(|(&own, distance)| own.min(distance)).collect()
+            };
+            let best = candidates.min_by_key(|&texel| lowered(texel).iter().sum::<u64>()).unwrap();
+            assert_eq!(found, best, "centre {number}");
+            own = lowered(best);
+        }
     }
 }

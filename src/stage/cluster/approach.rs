@@ -93,7 +93,8 @@ impl Plan {
         context: &Context<'_>,
     ) -> Result<(Clustering, Vec<Trial>)> {
         let most = most.min(points.len());
-        context.progress.begin("cluster", most as u64, Counted::Items("centres"));
+        let draws = self.options.restarts.max(1);
+        context.progress.begin("cluster", most as u64 * u64::from(draws), Counted::Items("centres"));
         let found = context.install(|| match self.options.amount {
             Amount::Error(target) => {
                 let mut trials = Trials::new(points, method, self.options.seed);
@@ -107,7 +108,7 @@ impl Plan {
             }
             Amount::Clusters(_) | Amount::Ratio(_) => {
                 let mut best: Option<Clustering> = None;
-                for attempt in 0..self.options.restarts.max(1) {
+                for attempt in 0..draws {
                     let seeds =
                         seeding::draw(points, most, self.options.seed, attempt, method.kernel, context)?;
                     let clustering = lloyd::run(points, points.vectors_of(&seeds), method, context)?;

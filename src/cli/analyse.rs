@@ -41,10 +41,10 @@ struct ClusterOptions {
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
     /// Most passes
-    #[arg(long, default_value_t = 50)]
+    #[arg(long, default_value_t = Limits::default().passes)]
     passes: usize,
     /// Least relative gain of the objective that is worth another pass
-    #[arg(long, default_value_t = 1e-4)]
+    #[arg(long, default_value_t = Limits::default().tolerance)]
     tolerance: f64,
     /// Texels to cluster in memory before all others are passed over [default: as many as 192 MiB hold]
     #[arg(long, value_name = "TEXELS")]
@@ -350,7 +350,7 @@ fn run_clusters(
     context: &Context<'_>,
 ) -> Result<cluster::Report> {
     match &options.clusters_of {
-        Some(from) => taken_plan(model, from)?.run(context),
+        Some(from) => taken_plan(model, from)?.run(),
         None => cluster_plan(measurement, model, options, seed)?.run(context),
     }
 }

@@ -49,7 +49,7 @@ impl Curve {
             most: self.most,
             // As btf cluster does unless told otherwise.
             centre: CentreRule::Median,
-            limits: Limits { passes: 50, tolerance: 1e-4 },
+            limits: Limits::default(),
             seed: self.seed,
         })?;
         let curve = plan.run(context)?;

@@ -10,7 +10,8 @@ use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, Plan, Report};
-use crate::store::passes::{History, State};
+use crate::store::passes::{History, Passes, State};
+use crate::texel::cluster::bounds::Centres;
 use crate::texel::cluster::lloyd::{self, Clustering, Method};
 use crate::texel::cluster::points::Points;
 use crate::texel::cluster::search::{Trial, Trials, more_clusters};
@@ -25,8 +26,10 @@ impl Plan {
         let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;
         let texels: Vec<u32> = clustering.nearest.iter().map(|near| near.texel).collect();
         let representatives = points.vectors_of(&texels);
+        let centres =
+            Centres { arrangement: &self.arrangement, vectors: &representatives, kernel: method.kernel };
         let from_representatives =
-            context.install(|| total_distance(&points, &representatives, &clustering.index, method.kernel));
+            context.install(|| total_distance(&points.vectors, &clustering.index, &centres));
         drop(points);
         let Clustering { centres, index, nearest, passes } = clustering;
         let history = History { passes, trials, ..History::default() };
@@ -43,9 +46,11 @@ impl Plan {
         Ok(self.state_of(clustering, History { trials, ..History::default() }))
     }
 
-    /// The same with more clusters than those that left too large an error.
-    pub(super) fn approach_more(
+    /// The same with more clusters than those that left too large an error; it is written as the beginning of `pass`.
+    pub(super) fn restart(
         &self,
+        passes: &Passes,
+        pass: usize,
         history: History,
         deadline: Option<Instant>,
         context: &Context<'_>,
@@ -57,7 +62,9 @@ impl Plan {
         let mut trials = Trials::new(&points, method, self.options.seed);
         let clustering = context.install(|| trials.run(clusters, context))?;
         context.progress.end();
-        Ok(self.state_of(clustering, history))
+        let state = self.state_of(clustering, history);
+        passes.write_state(pass, self.brdf(), &state)?;
+        Ok(state)
     }
 
     /// Clusters to try after those that were too few.

@@ -185,12 +185,18 @@ pub struct Plan {
     recipe: Value,
 }
 
+/// Digest of the measurement that a model was begun from, where it is known.
+fn measurement_of(model: &Model) -> Result<Option<String>> {
+    let entry = model.stage(Stage::Tile)?.unwrap_or_default();
+    let digest = entry.get("recipe").and_then(|recipe| recipe.get("measurement")).and_then(Value::as_str);
+    Ok(digest.map(str::to_owned))
+}
+
 /// Opens the measurement that a model was begun from.
 pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurement> {
     let measurement = Measurement::open(path)?;
-    let entry = model.stage(Stage::Tile)?.unwrap_or_default();
-    let expected = entry.get("recipe").and_then(|recipe| recipe.get("measurement")).and_then(Value::as_str);
-    if expected.is_some() && expected != Some(measurement.digest()) {
+    let expected = measurement_of(model)?;
+    if expected.is_some_and(|expected| expected != measurement.digest()) {
         return Err(Error::recipe(format!(
             "{} was cut from another measurement than {}",
             model.path().display(),
@@ -309,9 +315,8 @@ impl Plan {
                 Next::Pass(next) => (pass, state) = (pass + 1, *next),
                 Next::Restart(history) => {
                     drop(work);
-                    state = self.approach_more(*history, deadline, context)?;
                     pass += 1;
-                    passes.write_state(pass, self.brdf(), &state)?;
+                    state = self.restart(&passes, pass, *history, deadline, context)?;
                     work = self.work(&state, context)?;
                 }
                 Next::Finished(result) => return work.finish(&result, context),

@@ -3,8 +3,6 @@
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
-
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
@@ -20,6 +18,7 @@ use crate::texel::cluster::lloyd::{self, Pass};
 use crate::texel::cluster::nearest::{Farthest, Near, nearer};
 use crate::texel::cluster::search::Trial;
 use crate::texel::cluster::tally::Tally;
+use crate::texel::cluster::total_distance;
 
 /// What follows a pass.
 pub(super) enum Next {
@@ -88,7 +87,7 @@ impl<'a> Work<'a> {
         let method = self.plan.method(self.columns_allowed, None);
         let (rule, kernel) = (method.rule, method.kernel);
         let centres = arrangement.arranged(&state.centres);
-        let slots = slots_of(self.plan, &blocks);
+        let slots = selection.slots_of(&blocks);
         let now = Centres { arrangement, vectors: &centres, kernel };
         let steps = Steps::of(arrangement);
         let mut bounds = match self.bounds.take() {
@@ -150,31 +149,21 @@ impl Work<'_> {
     /// Writes the model. What the representatives leave takes the texels once more: only now are they known.
     pub(super) fn finish(&mut self, clustered: &Clustered, context: &Context<'_>) -> Result<Report> {
         let Plan { arrangement, selection, .. } = self.plan;
-        let kernel = self.plan.method(0, None).kernel;
-        let (stride, groups) = (arrangement.stride(), arrangement.groups());
         let vectors = self.plan.read_vectors(&self.plan.sources(clustered), context)?;
+        let kernel = self.plan.method(0, None).kernel;
+        let representatives = Centres { arrangement, vectors: &vectors, kernel };
         let blocks = 0..selection.blocks().len();
         context.progress.begin("representatives", selection.texels() as u64, Counted::Items("texels"));
         let mut total = 0;
         self.stream.for_each(blocks, context, |block, points| {
             let numbers = selection.numbers(block.slots.clone());
-            let distances = points.par_chunks_exact(stride).zip(numbers).map(|(point, &number)| {
-                let cluster = usize::from(clustered.index[number as usize]);
-                kernel.row_distances(point, [&vectors[cluster * stride..][..stride]], groups)[0]
-            });
-            total += distances.sum::<u64>();
+            let index: Vec<u16> = numbers.iter().map(|&number| clustered.index[number as usize]).collect();
+            total += total_distance(points, &index, &representatives);
             Ok(())
         })?;
         context.progress.end();
         self.plan.finish(clustered, &vectors, total, context)
     }
-}
-
-/// The slots of a run of blocks.
-fn slots_of(plan: &Plan, blocks: &Range<usize>) -> Range<usize> {
-    let blocks = &plan.selection.blocks()[blocks.clone()];
-    let start = blocks.first().map_or(0, |block| block.slots.start);
-    start..blocks.last().map_or(start, |block| block.slots.end)
 }
 
 impl Plan {
@@ -187,20 +176,21 @@ impl Plan {
         context: &Context<'_>,
     ) -> Result<Stepped> {
         let state = passes.state(pass, self.brdf(), self.selection.texels())?;
-        let parts: Vec<usize> = (0..self.selection.parts().len()).filter(|&part| shard.has(part)).collect();
-        let texels: usize = parts.iter().map(|&part| self.selection.slots_of(part).len()).sum();
+        let parts: Vec<_> =
+            self.selection.parts().iter().enumerate().filter(|&(part, _)| shard.has(part)).collect();
+        let texels: usize = parts.iter().map(|(_, blocks)| self.selection.slots_of(blocks).len()).sum();
         let title = format!("pass {}", state.history.passes.len() + 1);
         context.progress.begin(&title, texels as u64, Counted::Items("texels"));
         let (mut found, mut written) = (0, 0);
-        for part in parts {
+        for (part, blocks) in parts {
             if passes.has_part(pass, part)? {
-                context.progress.advance(self.selection.slots_of(part).len() as u64);
+                context.progress.advance(self.selection.slots_of(blocks).len() as u64);
                 found += 1;
                 continue;
             }
             // Bounds do not outlive a part: one column is the least.
             let mut work = Work::with(self, 1, 0);
-            let assigned = work.assign(self.selection.parts()[part].clone(), &state, context)?;
+            let assigned = work.assign(blocks.clone(), &state, context)?;
             passes.write_part(pass, part, &assigned)?;
             written += 1;
         }
@@ -213,9 +203,9 @@ impl Plan {
         let state = passes.state(pass, self.brdf(), self.selection.texels())?;
         let stride = self.arrangement.stride();
         let mut whole: Option<Found> = None;
-        for part in 0..self.selection.parts().len() {
+        for (part, blocks) in self.selection.parts().iter().enumerate() {
             context.check_stop()?;
-            let slots = self.selection.slots_of(part).len();
+            let slots = self.selection.slots_of(blocks).len();
             let found = passes.part(pass, part, slots, self.options.centre, stride)?;
             whole = Some(match whole {
                 None => found,
@@ -226,8 +216,7 @@ impl Plan {
         match self.follow(passes, pass, &state, whole, None, context)? {
             Next::Pass(_) => Ok(Stepped::Next(pass + 1)),
             Next::Restart(history) => {
-                let state = self.approach_more(*history, None, context)?;
-                passes.write_state(pass + 1, self.brdf(), &state)?;
+                self.restart(passes, pass + 1, *history, None, context)?;
                 Ok(Stepped::Next(pass + 1))
             }
             Next::Finished(result) => {

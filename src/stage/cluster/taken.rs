@@ -7,8 +7,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::run::Context;
-use crate::stage::cluster::{METHOD, Report};
+use crate::stage::cluster::{METHOD, Report, measurement_of};
 use crate::store::model::{Model, Stage};
 
 /// Which clusters to take.
@@ -31,13 +30,9 @@ pub struct Plan {
 pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
     let from = Model::open(&options.from)?;
-    let measurement = |model: &Model| -> Result<Value> {
-        let tile = model.stage(Stage::Tile)?.unwrap_or_default();
-        Ok(tile.get("recipe").and_then(|recipe| recipe.get("measurement")).cloned().unwrap_or_default())
-    };
     let tile = model.stage_digest(Stage::Tile)?;
     let clusters = from.stage_digest(Stage::Cluster)?;
-    if measurement(&model)? != measurement(&from)? {
+    if measurement_of(&model)? != measurement_of(&from)? {
         return Err(Error::recipe(format!(
             "{} was cut from another measurement than {}",
             from.path().display(),
@@ -58,7 +53,7 @@ impl Plan {
     ///
     /// # Errors
     /// Where a texel of the tile is not in the other one.
-    pub fn run(&self, _: &Context<'_>) -> Result<Report> {
+    pub fn run(&self) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
             return self.model.report(Stage::Cluster);
         };

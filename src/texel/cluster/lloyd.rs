@@ -22,6 +22,12 @@ pub struct Limits {
     pub tolerance: f64,
 }
 
+impl Default for Limits {
+    fn default() -> Self {
+        Self { passes: 50, tolerance: 1e-4 }
+    }
+}
+
 /// One pass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pass {

@@ -12,19 +12,16 @@ pub mod seeding;
 pub mod selection;
 pub mod tally;
 
-use crate::kernel::Kernel;
-use crate::texel::cluster::points::{Arrangement, Points};
+use crate::texel::cluster::bounds::Centres;
+use crate::texel::cluster::points::Arrangement;
 
-/// Sum of the distances of texels from the vectors [cluster, stride] of their clusters.
-pub fn total_distance(points: &Points, vectors: &[u8], index: &[u16], kernel: Kernel) -> u64 {
+/// Sum of the distances of texels [texel, stride] from the centres, or what stands for them, of their clusters.
+pub fn total_distance(points: &[u8], index: &[u16], centres: &Centres<'_>) -> u64 {
     use rayon::prelude::*;
-    let (stride, groups) = (points.arrangement.stride(), points.arrangement.groups());
-    let texels = points.vectors.par_chunks_exact(stride).zip(index);
+    let (stride, groups) = (centres.arrangement.stride(), centres.arrangement.groups());
+    let texels = points.par_chunks_exact(stride).zip(index);
     texels
-        .map(|(point, &cluster)| {
-            let centre = &vectors[usize::from(cluster) * stride..][..stride];
-            kernel.row_distances(point, [centre], groups)[0]
-        })
+        .map(|(point, &cluster)| centres.kernel.row_distances(point, [centres.vector(cluster)], groups)[0])
         .sum()
 }
 

@@ -93,11 +93,11 @@ impl Selection {
         &self.parts
     }
 
-    /// The slots of a part.
-    pub fn slots_of(&self, part: usize) -> Range<usize> {
-        let blocks = &self.blocks[self.parts[part].clone()];
-        let end = |block: Option<&Block>| block.map_or(0, |block| block.slots.end);
-        blocks.first().map_or(0, |block| block.slots.start)..end(blocks.last())
+    /// The slots of a run of blocks.
+    pub fn slots_of(&self, blocks: &Range<usize>) -> Range<usize> {
+        let blocks = &self.blocks[blocks.clone()];
+        let start = blocks.first().map_or(0, |block| block.slots.start);
+        start..blocks.last().map_or(start, |block| block.slots.end)
     }
 
     /// Texel numbers of some slots.
@@ -159,7 +159,7 @@ mod tests {
         let selection = Selection::new(&sources, 16);
         assert!(selection.blocks().iter().all(|block| block.slots.len() <= BLOCK_TEXELS));
         let slots: Vec<Range<usize>> =
-            (0..selection.parts().len()).map(|part| selection.slots_of(part)).collect();
+            selection.parts().iter().map(|part| selection.slots_of(part)).collect();
         assert_eq!((slots[0].start, slots[slots.len() - 1].end), (0, size.texels()));
         assert!(slots[..slots.len() - 1].iter().all(|slots| slots.len() >= size.texels() / PARTS));
         assert!(slots.windows(2).all(|pair| pair[0].end == pair[1].start));

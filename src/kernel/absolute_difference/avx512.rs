@@ -5,7 +5,6 @@ use std::arch::x86_64::*;
 use super::TILE;
 
 type Register = __m512i;
-const REGISTER_BYTES: usize = size_of::<Register>();
 
 /// Sums of strips of one length, a multiple of [`super::LANE_BYTES`].
 #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
@@ -33,25 +32,11 @@ pub(super) fn row<const C: usize>(point: &[u8], centres: [&[u8]; C]) -> [u32; C]
     sums.map(|lanes| _mm512_reduce_add_epi64(lanes) as u32)
 }
 
-/// Sums of each pair as eight u64 that are yet to be added.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl")]
-#[inline]
-#[allow(unsafe_code)]
-fn lanes<const P: usize, const C: usize>(points: [&[u8]; P], centres: [&[u8]; C]) -> [[Register; C]; P] {
-    let length = points[0].len();
-    assert!(length.is_multiple_of(REGISTER_BYTES));
-    assert!(points.iter().chain(&centres).all(|strip| strip.len() == length));
-    let mut sums = [[_mm512_setzero_si512(); C]; P];
-    for at in (0..length).step_by(REGISTER_BYTES) {
-        // SAFETY: a register from `at` on lies within each strip, as just checked; loads need no alignment.
-        let load = |strip: &[u8]| unsafe { _mm512_loadu_si512(strip.as_ptr().add(at).cast()) };
-        let centres = centres.map(load);
-        for (sums, point) in sums.iter_mut().zip(points) {
-            let point = load(point);
-            for (sum, centre) in sums.iter_mut().zip(centres) {
-                *sum = _mm512_add_epi64(*sum, _mm512_sad_epu8(point, centre));
-            }
-        }
-    }
-    sums
-}
+lanes!(
+    "avx512f,avx512bw,avx512vl",
+    Register,
+    _mm512_loadu_si512,
+    _mm512_setzero_si512,
+    _mm512_add_epi64,
+    _mm512_sad_epu8
+);

@@ -6,6 +6,38 @@
 //! Many texels against many centres go by strips of the vectors and tiles of texels and centres: the strip of a few
 //! texels stays in the nearest cache while those of all centres pass by, and a tile's sums stay in registers.
 
+/// Defines `lanes` for one set of instructions: the sums of each pair of strips as the u64 of a register, which are
+/// yet to be added.
+#[cfg(target_arch = "x86_64")]
+macro_rules! lanes {
+    ($features:literal, $register:ty, $load:ident, $zero:ident, $add:ident, $sad:ident) => {
+        #[target_feature(enable = $features)]
+        #[inline]
+        #[allow(unsafe_code)]
+        fn lanes<const P: usize, const C: usize>(
+            points: [&[u8]; P],
+            centres: [&[u8]; C],
+        ) -> [[$register; C]; P] {
+            let length = points[0].len();
+            assert!(length.is_multiple_of(size_of::<$register>()));
+            assert!(points.iter().chain(&centres).all(|strip| strip.len() == length));
+            let mut sums = [[$zero(); C]; P];
+            for at in (0..length).step_by(size_of::<$register>()) {
+                // SAFETY: a register from `at` on lies within each strip, as just checked; loads need no alignment.
+                let load = |strip: &[u8]| unsafe { $load(strip.as_ptr().add(at).cast()) };
+                let centres = centres.map(load);
+                for (sums, point) in sums.iter_mut().zip(points) {
+                    let point = load(point);
+                    for (sum, centre) in sums.iter_mut().zip(centres) {
+                        *sum = $add(*sum, $sad(point, centre));
+                    }
+                }
+            }
+            sums
+        }
+    };
+}
+
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]

@@ -10,7 +10,6 @@ use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
 use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
-use btfkit::texel::nearest::{NearestNormals, Neighbour};
 use btfkit_formats::{Direction, SampleType, Samples};
 use divan::counter::{BytesCount, ItemsCount};
 use divan::{Bencher, black_box};
@@ -152,19 +151,6 @@ fn lightness_codes(bencher: Bencher<'_, '_>) {
     bencher
         .counter(ItemsCount::new(1usize << 16))
         .bench_local(|| codes.fill(black_box(&samples), &mut found));
-}
-
-/// The 16 nearest of the normals of a 137 x 142 tile.
-#[divan::bench]
-fn nearest_normals(bencher: Bencher<'_, '_>) {
-    let tree = NearestNormals::new(&normals(137 * 142, 0));
-    let queries = normals(4096, 1);
-    let mut found = [Neighbour { distance: 0.0, texel: 0 }; 16];
-    bencher.counter(ItemsCount::new(queries.len())).bench_local(|| {
-        for &query in &queries {
-            tree.find(query, black_box(&mut found));
-        }
-    });
 }
 
 /// Rows of a synthesised field, 1024 texels wide.

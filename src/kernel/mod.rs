@@ -4,6 +4,7 @@ pub mod absolute_difference;
 pub mod bounds;
 pub mod counting;
 pub mod predict;
+pub mod ranking;
 
 /// Instructions to use, chosen once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

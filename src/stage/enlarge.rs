@@ -8,6 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
+use crate::kernel::Kernel;
 use crate::mrf::Synthesis;
 use crate::run::Context;
 use crate::run::progress::Counted;
@@ -16,8 +17,8 @@ use crate::shape::{Size, Window};
 use crate::stage::cluster;
 use crate::store::enlarged::{Description, Enlarged, SHARD_SIDE};
 use crate::store::model::{Model, Stage};
-use crate::texel::nearest::{NearestNormals, Neighbour};
-use crate::texel::scan::Scan;
+use crate::texel::nearest::NearestNormals;
+use crate::texel::scan::{Neighbours, Scan};
 
 /// Bytes of candidates and normals in a band, unless its rows are given.
 const BAND_BYTES: usize = 64 << 20;
@@ -110,7 +111,7 @@ impl Plan {
     }
 
     fn band_row_bytes(&self) -> usize {
-        self.options.size.width * (size_of::<Neighbour>() * self.options.candidates + size_of::<[f32; 3]>())
+        self.options.size.width * (size_of::<u32>() * self.options.candidates + size_of::<[f32; 3]>())
     }
 
     fn band_rows(&self) -> usize {
@@ -142,8 +143,10 @@ impl Plan {
             ));
         }
         // All that can fail for the model's sake comes before the output is begun.
-        let normals = NearestNormals::new(&self.model.normals()?);
-        let scan = Scan::new(self.model.index()?, self.model.distance()?);
+        let normals = self.model.normals()?;
+        let normals =
+            context.install(|| NearestNormals::new(&normals, self.options.candidates, Kernel::fastest()));
+        let scan = Scan::new(self.model.index()?, &self.model.distance()?);
         let mut field = Synthesis::new(&self.model.field()?, self.options.seed, height, width)?;
         let output =
             Enlarged::create(&self.options.output, &self.description, &self.recipe, &self.options.model)?;
@@ -178,7 +181,8 @@ impl Plan {
                 let candidates = context.install(|| self.candidates(&normals, &band));
                 for candidates in candidates.chunks_exact(width * self.options.candidates) {
                     let mut sources = vec![0; width];
-                    scan.choose_row(candidates, above.as_deref(), &mut sources);
+                    let neighbours = Neighbours { above: above.as_deref(), ..Neighbours::default() };
+                    scan.choose_row(candidates, neighbours, &mut sources);
                     let clusters: Vec<u16> = sources.iter().map(|&texel| scan.cluster(texel)).collect();
                     index.extend_from_slice(&clusters);
                     above = Some(clusters);
@@ -194,14 +198,13 @@ impl Plan {
         Ok(report)
     }
 
-    fn candidates(&self, normals: &NearestNormals, band: &[[f32; 3]]) -> Vec<Neighbour> {
+    fn candidates(&self, normals: &NearestNormals, band: &[[f32; 3]]) -> Vec<u32> {
         let per_texel = self.options.candidates;
-        let mut candidates = vec![Neighbour { distance: 0.0, texel: 0 }; band.len() * per_texel];
+        let mut candidates = vec![0; band.len() * per_texel];
         candidates
-            .par_chunks_exact_mut(per_texel)
-            .zip(band)
-            .with_min_len(256)
-            .for_each(|(found, &normal)| normals.find(normal, found));
+            .par_chunks_mut(256 * per_texel)
+            .zip(band.par_chunks(256))
+            .for_each(|(found, queries)| normals.find_row(queries, found));
         candidates
     }
 }

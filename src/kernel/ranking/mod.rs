@@ -1,0 +1,154 @@
+//! Ranking: of up to [`CAPACITY`] candidates the nearest to a query, in order.
+//!
+//! The SIMD kernels take many queries at once. Each candidate becomes a whole number, a key: the bits of its squared
+//! distance in f32, the last [`SLOT_BITS`] of them replaced by its slot. Keys are transposed, so that a lane belongs
+//! to a query, and sorted by a network of minima and maxima, which needs no shuffling.
+//!
+//! *When keys can be trusted.* A squared distance of f32 vectors, computed in f32, takes at most five roundings of
+//! a relative 2^-24 each (a difference, which counts twice in its square, a product, two sums) and all terms are
+//! positive: it is off by at most 5 x 2^-24 and a little, which is at most 6 units of its last place, also where
+//! numbers are subnormal. Bits of positive floats are in the order of the floats, so the exact order of two
+//! candidates is known when their bits differ by more than 12; the reference in f64 is off by far less than one.
+//! Keys that differ by at least `2 << SLOT_BITS` come from bits that differ by more than `1 << SLOT_BITS` = 64. Where
+//! two of the keys that follow each other in the result are nearer than that, the query is ranked again in f64.
+
+use super::Kernel;
+
+#[cfg(target_arch = "x86_64")]
+#[macro_use]
+mod network;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+
+/// Most candidates.
+pub const CAPACITY: usize = 48;
+
+/// Most ranks that are found.
+pub const RANKS: usize = 16;
+
+/// Queries ranked at a time.
+pub const BATCH: usize = 16;
+
+/// Bits of a key that hold a slot.
+#[cfg(target_arch = "x86_64")]
+const SLOT_BITS: u32 = CAPACITY.next_power_of_two().ilog2();
+
+/// Keys nearer than this do not tell the order.
+#[cfg(target_arch = "x86_64")]
+const DOUBTFUL: i32 = 2 << SLOT_BITS;
+
+/// Candidates in the order of their numbers, component by component; slots behind them lie at infinity.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
+pub struct Candidates {
+    x: [f32; CAPACITY],
+    y: [f32; CAPACITY],
+    z: [f32; CAPACITY],
+    number: [u32; CAPACITY],
+}
+
+impl Candidates {
+    /// No candidates.
+    pub const NONE: Self = Self {
+        x: [f32::INFINITY; CAPACITY],
+        y: [f32::INFINITY; CAPACITY],
+        z: [f32::INFINITY; CAPACITY],
+        number: [u32::MAX; CAPACITY],
+    };
+
+    /// From points and their numbers, which must ascend. Points that exceed the capacity are left out.
+    pub fn new(points: impl IntoIterator<Item = ([f32; 3], u32)>) -> Self {
+        let mut candidates = Self::NONE;
+        for (slot, (point, number)) in points.into_iter().take(CAPACITY).enumerate() {
+            [candidates.x[slot], candidates.y[slot], candidates.z[slot]] = point;
+            candidates.number[slot] = number;
+        }
+        candidates
+    }
+
+    /// Whether there are none.
+    #[inline]
+    pub fn is_empty(&self) -> bool {
+        self.number[0] == u32::MAX
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.number.iter().filter(|&&number| number != u32::MAX).count()
+    }
+
+    /// Asks the memory for the candidates, to be there when they are ranked.
+    #[inline]
+    #[allow(unsafe_code)]
+    pub fn prefetch(&self) {
+        #[cfg(target_arch = "x86_64")]
+        for line in 0..size_of::<Self>() / 64 {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            // SAFETY: the address lies within `self`; a prefetch needs no feature beyond the architecture's base.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(self).cast::<i8>().add(64 * line)) };
+        }
+    }
+
+    /// The nearest to one query by squared distance in f64, summed x, y, z; ties by number.
+    fn rank(&self, query: [f32; 3], found: &mut [u32]) {
+        let query = query.map(f64::from);
+        let mut distances = [0.0; CAPACITY];
+        for (slot, distance) in distances.iter_mut().enumerate() {
+            let x = query[0] - f64::from(self.x[slot]);
+            let y = query[1] - f64::from(self.y[slot]);
+            let z = query[2] - f64::from(self.z[slot]);
+            *distance = x * x + y * y + z * z;
+        }
+        let mut nearest = [(f64::INFINITY, u32::MAX); RANKS];
+        let nearest = &mut nearest[..found.len()];
+        let last = nearest.len() - 1;
+        // Numbers ascend, so that of equal distances the one that comes first stays before the other.
+        for (&distance, &number) in distances.iter().zip(&self.number) {
+            if distance < nearest[last].0 {
+                let mut place = last;
+                while place > 0 && distance < nearest[place - 1].0 {
+                    nearest[place] = nearest[place - 1];
+                    place -= 1;
+                }
+                nearest[place] = (distance, number);
+            }
+        }
+        for (found, &(_, number)) in found.iter_mut().zip(nearest.iter()) {
+            *found = number;
+        }
+    }
+}
+
+impl Kernel {
+    /// For each query the numbers of its nearest candidates, nearest first: `found` is [query, rank] with as many
+    /// ranks, 1 to [`RANKS`], as its length gives. Queries must be finite, and each must have at least as many
+    /// candidates as ranks are asked for; what is found otherwise means nothing.
+    pub fn rank(self, candidates: &[&Candidates; BATCH], queries: &[[f32; 3]; BATCH], found: &mut [u32]) {
+        let ranks = (found.len() / BATCH).clamp(1, RANKS);
+        #[cfg(target_arch = "x86_64")]
+        {
+            let mut all = [[0; RANKS]; BATCH];
+            #[allow(unsafe_code)]
+            let doubtful = match self {
+                Self::Plain => u32::MAX,
+                // SAFETY: a kernel is only ever constructed after its features were found.
+                Self::Avx2 => unsafe { avx2::rank(candidates, queries, ranks, &mut all) },
+                // SAFETY: as above.
+                Self::Avx512 => unsafe { avx512::rank(candidates, queries, ranks, &mut all) },
+            };
+            for (query, found) in found.chunks_exact_mut(ranks).enumerate() {
+                if doubtful >> query & 1 == 1 {
+                    candidates[query].rank(queries[query], found);
+                } else {
+                    found.copy_from_slice(&all[query][..ranks]);
+                }
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        for (query, found) in found.chunks_exact_mut(ranks).enumerate() {
+            candidates[query].rank(queries[query], found);
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The n_k nearest normals of the tile, exactly: by squared Euclidean distance of the stored f32 vectors in f64,
+//! summed x, y, z; ties by texel number.
+//!
+//! Unit vectors with z > 0 look a few candidates up by (x, y) and rank them; all other queries, and those where the
+//! candidates would be too many, go to a k-d tree.
+
+mod leaves;
+mod square;
+pub mod tree;
+
+use self::leaves::Leaves;
+use self::tree::{Neighbour, Tree};
+use crate::kernel::Kernel;
+use crate::kernel::ranking::{BATCH, Candidates, RANKS};
+
+/// Normals of a tile, ready to be searched.
+pub struct NearestNormals {
+    tree: Tree,
+    /// None if more neighbours are wanted than can be ranked.
+    leaves: Option<Leaves>,
+    count: usize,
+    kernel: Kernel,
+}
+
+impl NearestNormals {
+    /// Over the normals of a tile, whose order gives the texel numbers, for the `count` nearest. Works in parallel;
+    /// what is found depends on neither threads nor kernel.
+    pub fn new(normals: &[[f32; 3]], count: usize, kernel: Kernel) -> Self {
+        let points = distinct(normals, count);
+        let tree = Tree::new(points.clone());
+        let leaves = (1..=RANKS).contains(&count).then(|| Leaves::new(&points, &tree, count, kernel));
+        Self { tree, leaves, count, kernel }
+    }
+
+    /// Finds the nearest normals of each query: `found` is [query, rank], texel numbers, nearest first. There must be
+    /// as many normals as ranks.
+    pub fn find_row(&self, queries: &[[f32; 3]], found: &mut [u32]) {
+        let Some(leaves) = &self.leaves else {
+            return self.find_by_tree(queries, found);
+        };
+        let (batches, rest) = queries.as_chunks::<BATCH>();
+        let (found, found_rest) = found.split_at_mut(batches.len() * BATCH * self.count);
+        let look_up = |batch: &[[f32; 3]; BATCH]| {
+            batch.map(|query| {
+                let candidates = leaves.find(query);
+                candidates.prefetch();
+                candidates
+            })
+        };
+        // Candidates are asked for a batch ahead.
+        let mut ahead = batches.first().map(look_up);
+        for (number, (batch, found)) in
+            batches.iter().zip(found.chunks_exact_mut(BATCH * self.count)).enumerate()
+        {
+            let candidates = ahead.unwrap_or([&Candidates::NONE; BATCH]);
+            ahead = batches.get(number + 1).map(look_up);
+            self.kernel.rank(&candidates, batch, found);
+            for (place, candidates) in candidates.iter().enumerate() {
+                if candidates.is_empty() {
+                    let found = &mut found[place * self.count..][..self.count];
+                    self.find_by_tree(&batch[place..=place], found);
+                }
+            }
+        }
+        self.find_by_tree(rest, found_rest);
+    }
+
+    fn find_by_tree(&self, queries: &[[f32; 3]], found: &mut [u32]) {
+        let mut nearest = vec![Neighbour::NONE; self.count];
+        for (&query, found) in queries.iter().zip(found.chunks_exact_mut(self.count)) {
+            self.tree.find(query, &mut nearest);
+            for (found, nearest) in found.iter_mut().zip(&nearest) {
+                *found = nearest.point;
+            }
+        }
+    }
+
+    /// How many candidates are ranked for a query; none if it goes to the tree.
+    pub fn candidates(&self, query: [f32; 3]) -> Option<usize> {
+        let candidates = self.leaves.as_ref()?.find(query).len();
+        (candidates > 0).then_some(candidates)
+    }
+
+    /// Bytes held.
+    pub fn memory_bytes(&self) -> usize {
+        self.tree.memory_bytes() + self.leaves.as_ref().map_or(0, Leaves::memory_bytes)
+    }
+}
+
+/// The normals with their texel numbers, without those that can never be found since `count` equal ones precede them.
+fn distinct(normals: &[[f32; 3]], count: usize) -> Vec<([f32; 3], u32)> {
+    let bits = |texel: u32| normals[texel as usize].map(f32::to_bits);
+    let mut texels: Vec<u32> = (0..normals.len() as u32).collect();
+    texels.sort_unstable_by_key(|&texel| (bits(texel), texel));
+    let mut kept: Vec<u32> = texels
+        .chunk_by(|&a, &b| bits(a) == bits(b))
+        .flat_map(|equal| &equal[..equal.len().min(count)])
+        .copied()
+        .collect();
+    kept.sort_unstable();
+    kept.into_iter().map(|texel| (normals[texel as usize], texel)).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -2,13 +2,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use btfkit::error::{Error, Result};
-use btfkit::mrf;
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::stage::cluster::{Amount, Step, Stepped};
 use btfkit::stage::import::Shard;
-use btfkit::stage::{cluster, compare, fit, image, normals, tile};
-use btfkit::store::field::FieldReport;
+use btfkit::stage::{cluster, compare, image, normals, tile};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use btfkit::texel::cluster::centre::CentreRule;
@@ -16,6 +14,7 @@ use btfkit::texel::cluster::lloyd::Limits;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
+use super::fit::{FitOptions, fit_plan, tell_field};
 use super::table::{row, table};
 use super::{Tell, bytes_text};
 
@@ -83,24 +82,6 @@ struct NormalsOptions {
     /// Leave out shadowed and highlighted lights
     #[arg(long)]
     robust: bool,
-}
-
-#[derive(Args)]
-struct FitOptions {
-    /// Random field: all channels together, or one by one after the Karhunen-Loeve transform
-    #[arg(long, value_enum, default_value = "3d")]
-    mrf: Field,
-    /// Levels of the pyramid [default: as many as keep ten samples per parameter, at most 5]
-    #[arg(long)]
-    levels: Option<usize>,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Field {
-    #[value(name = "3d")]
-    Car3d,
-    #[value(name = "2d")]
-    Car2d,
 }
 
 #[derive(Args)]
@@ -201,18 +182,6 @@ pub(super) struct Normals {
     model: PathBuf,
     #[command(flatten)]
     options: NormalsOptions,
-    /// Only say what would be done
-    #[arg(long)]
-    dry_run: bool,
-}
-
-/// Fit the random field to a model's normal map
-#[derive(Args)]
-pub(super) struct Fit {
-    /// The model with the normal map
-    model: PathBuf,
-    #[command(flatten)]
-    options: FitOptions,
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
@@ -321,17 +290,6 @@ impl Normals {
     }
 }
 
-impl Fit {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let plan = fit_plan(&self.model, &self.options)?;
-        if self.dry_run {
-            return tell.plan(&plan.summary());
-        }
-        tell_field(&plan.run(context)?, tell);
-        Ok(())
-    }
-}
-
 fn tile_plan(measurement: &Path, model: &Path, options: &TileOptions, seed: u64) -> Result<tile::Plan> {
     tile::plan(&tile::Options {
         measurement: measurement.into(),
@@ -396,14 +354,6 @@ fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> R
     })
 }
 
-fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> {
-    let kind = match options.mrf {
-        Field::Car3d => mrf::Kind::Car3d,
-        Field::Car2d => mrf::Kind::Car2d,
-    };
-    fit::plan(&fit::Options { model: model.into(), kind, levels: options.levels })
-}
-
 fn tell_tile(report: &tile::Report, tell: Tell) {
     let [height, width] = report.size;
     let seams = match &report.patch {
@@ -453,22 +403,6 @@ fn tell_normals(report: &normals::Report, tell: Tell) {
         "normals   by {} lights of view {}; mean ({x:.3}, {y:.3}, {z:.3}), spread {:.1} degrees",
         report.lights, report.view, report.spread_deg
     ));
-}
-
-fn tell_field(report: &FieldReport, tell: Tell) {
-    let levels: Vec<String> = report
-        .levels
-        .iter()
-        .map(|level| {
-            format!("{}x{} eta {} radius {:.3}", level.size[1], level.size[0], level.eta, level.radius)
-        })
-        .collect();
-    tell.line(format!("field     {} CAR; {}", report.mrf, levels.join(", ")));
-    for (number, level) in report.levels.iter().enumerate() {
-        if let Some(note) = &level.note {
-            tell.line(format!("          level {number}: {note}"));
-        }
-    }
 }
 
 impl Compare {

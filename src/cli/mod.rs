@@ -6,6 +6,7 @@ mod curve;
 mod demo;
 mod enlarge;
 mod export;
+mod fit;
 mod image;
 mod import;
 mod info;
@@ -87,7 +88,7 @@ enum Command {
     Cluster(analyse::Cluster),
     Curve(curve::Curve),
     Normals(analyse::Normals),
-    Fit(analyse::Fit),
+    Fit(fit::Fit),
     Compare(analyse::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),

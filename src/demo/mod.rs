@@ -21,7 +21,6 @@ use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
 use crate::demo::story::Section;
 use crate::demo::times::Times;
 use crate::error::Result;
-use crate::mrf;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::sample::Kind;
@@ -217,8 +216,7 @@ fn analyse(
         normals::plan(&normals::Options { measurement, model, robust: false })?.run(context).map(|_| ())
     })?;
     times.time("fit", found(Stage::Fit), || {
-        let options = fit::Options { model: model.clone(), kind: mrf::Kind::Car3d, levels: None };
-        fit::plan(&options)?.run(context).map(|_| ())
+        fit::plan(&fit::Options::of(model.clone()))?.run(context).map(|_| ())
     })
 }
 
@@ -234,8 +232,9 @@ fn enlarge(
         model: model.to_owned(),
         output: output.to_owned(),
         size: settings.enlarged,
-        seed: settings.seed,
+        seeds: settings.seed..=settings.seed,
         candidates: settings.candidates,
+        tileable: false,
         keep_normals: true,
         band_rows: None,
     };

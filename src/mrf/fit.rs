@@ -1,14 +1,15 @@
-//! Fitting a model to a normal map: mean, (2D: Karhunen-Loeve,) pyramid, and at each level the causal neighbourhood of
-//! the highest evidence that the level can carry and that gives a stable field.
+//! Fitting a model to a field: mean, (2D: Karhunen-Loeve,) pyramid, and at each level the causal neighbourhood of the
+//! highest evidence that the level can carry and that gives a stable field.
 
 use nalgebra::DMatrix;
 
-use super::budget::{affords, balance, joint_channels, level_count};
+use super::budget::{affords, balance, joint_channels};
 use super::car::{Moments, Positions, Posterior, Prior};
+use super::choice::{Choice, Fitted};
 use super::field::{Boundary, Field};
 use super::model::{Kind, Level, Model, Options};
 use super::stability::STABLE_RADIUS;
-use super::{karhunen_loeve, neighbourhood, pyramid};
+use super::{karhunen_loeve, neighbourhood};
 use crate::error::{Error, Result};
 
 /// Factor by which a field that no neighbourhood makes stable is damped, again and again.
@@ -16,8 +17,9 @@ const DAMPING: f64 = 0.95;
 
 /// Fits a model to a field of any number of channels.
 ///
-/// Band means, which a border that does not wrap leaves, are subtracted and dropped, so that the mean of a synthesis
-/// is that of the data.
+/// Where the number of levels is left open, it is the one whose synthesis has the least error of autocovariance. Band
+/// means, which a border that does not wrap leaves, are subtracted and dropped, so that the mean of a synthesis is
+/// that of the data.
 ///
 /// # Errors
 /// When a sample is not finite, or the field or a level is too small for two neighbours.
@@ -39,19 +41,24 @@ pub fn fit(field: &Field, options: &Options) -> Result<Model> {
             (karhunen_loeve::project(&centred, &transform), Some(transform))
         }
     };
-    let levels = level_count([field.height, field.width], field.channels, options)?;
-    let bands = pyramid::decompose(&centred, levels, options.boundary)?;
-    let fit_band = |(k, band)| {
-        fit_level(band, options).map_err(|error| {
-            error.context(format!("pyramid level {k}")).hint("ask for fewer levels, or take a larger tile")
+    let pyramid = Fitted::new(&centred, options)?;
+    let least = options.levels.unwrap_or(1);
+    let choices = (least..=pyramid.most_levels()).map(|levels| pyramid.choice(levels, options.gains));
+    let Choice { levels, covariance, autocovariance_error } = choices
+        .reduce(|best, next| {
+            let (best, next) = (best?, next?);
+            Ok(if next.autocovariance_error < best.autocovariance_error { next } else { best })
         })
+        .ok_or_else(|| Error::internal("a pyramid of no levels"))??;
+    let covariance = match &transform {
+        None => covariance,
+        Some(t) => t.transpose() * covariance * t,
     };
-    let levels = bands.iter().enumerate().map(fit_band).collect::<Result<_>>()?;
-    Ok(Model { kind: options.kind, mean, transform, levels })
+    Ok(Model { kind: options.kind, mean, transform, levels, covariance, autocovariance_error })
 }
 
 /// One band: choice of the neighbourhood, estimates, stability.
-fn fit_level(band: &Field, options: &Options) -> Result<Level> {
+pub(super) fn fit_level(band: &Field, options: &Options) -> Result<Level> {
     let size = [band.height, band.width];
     let mut sets = neighbourhood::nested();
     let count = sets.iter().take_while(|set| affords(size, band.channels, set, options)).count();
@@ -109,6 +116,7 @@ fn estimate(moments: &[Moments], set: &[[i32; 2]], prior: &Prior, kind: Kind) ->
         gamma,
         sigma,
         prior: *prior,
+        gain: 1.0,
         log_evidence: 0.0,
         radius: 0.0,
         size: [0, 0],
@@ -162,11 +170,13 @@ fn damp(level: &mut Level, moments: &[Moments], kind: Kind) -> Result<()> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::mrf::Synthesis;
     use crate::mrf::model::tests::single;
+    use crate::mrf::synthesis::Synthesis;
+    use crate::mrf::{Gains, pyramid};
     use crate::random::Hash;
 
-    const OPTIONS: Options = Options { kind: Kind::Car3d, levels: None, boundary: Boundary::Periodic };
+    const OPTIONS: Options =
+        Options { kind: Kind::Car3d, levels: None, gains: Gains::None, boundary: Boundary::Periodic };
 
     /// Noise smoothed twice by a periodic kernel: a random field that has every scale up to some texels.
     fn smooth(height: usize, width: usize, channels: usize) -> Field {
@@ -190,7 +200,7 @@ mod tests {
             let field = smooth(48, 48, channels);
             for boundary in [Boundary::Periodic, Boundary::Mirrored] {
                 let [joint, scalar] = [Kind::Car3d, Kind::Car2d].map(|kind| {
-                    let model = fit(&field, &Options { kind, levels: Some(2), boundary }).unwrap();
+                    let model = fit(&field, &Options { kind, levels: Some(2), boundary, ..OPTIONS }).unwrap();
                     model.check().unwrap();
                     assert_eq!([model.levels[0].size, model.levels[1].size], [[48, 48], [24, 24]]);
                     assert!(model.levels.iter().all(|level| level.note.is_none()));
@@ -225,7 +235,8 @@ mod tests {
         let scalar = single(Kind::Car2d, &sites, &[0.5, 0.3, 0.1, -0.1, 0.2, -0.4, 0.1, 0.3], &[1.0, 0.3]);
         for truth in [joint, scalar] {
             let field = synthesised(&truth, 4, 400, 400);
-            let options = Options { kind: truth.kind, levels: Some(1), boundary: Boundary::Mirrored };
+            let options =
+                Options { kind: truth.kind, levels: Some(1), boundary: Boundary::Mirrored, ..OPTIONS };
             let found = fit(&field, &options).unwrap();
             let (level, expected) = (&found.levels[0], &truth.levels[0]);
             assert_eq!(level.neighbourhood, expected.neighbourhood);
@@ -257,16 +268,48 @@ mod tests {
             let bands = pyramid::decompose(&data, 3, Boundary::Periodic).unwrap();
             for (level, band) in model.levels.iter().zip(&bands) {
                 let alone = Model {
-                    kind,
                     mean: vec![0.0; 3],
                     transform: model.transform.as_ref().map(|_| DMatrix::identity(3, 3)),
                     levels: vec![level.clone()],
+                    ..model.clone()
                 };
                 let found = synthesised(&alone, 1, 512, 512).second_moments().diagonal();
                 let ratio = found.component_div(&band.second_moments().diagonal());
                 assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.1), "{kind:?} {:?}: {ratio}", level.size);
             }
         }
+    }
+
+    #[test]
+    fn gains_make_up_for_what_independent_levels_lose() {
+        let field = smooth(128, 128, 2);
+        let expected = field.centred().0.second_moments();
+        for kind in [Kind::Car3d, Kind::Car2d] {
+            let [plain, matched] = [Gains::None, Gains::Matched].map(|gains| {
+                let model = fit(&field, &Options { kind, levels: Some(3), gains, ..OPTIONS }).unwrap();
+                let made = synthesised(&model, 1, 512, 512).centred().0.second_moments();
+                let told = &model.covariance;
+                assert!((&made - told).norm() < 0.05 * told.norm(), "{kind:?} {gains:?}: {made} for {told}");
+                (made[(0, 0)] / expected[(0, 0)], model.autocovariance_error)
+            });
+            assert!(plain.0 < 0.85 && (matched.0 - 1.0).abs() < 0.08, "{plain:?}, {matched:?}");
+            assert!(matched.1 < 0.7 * plain.1, "{plain:?}, {matched:?}");
+        }
+    }
+
+    #[test]
+    fn the_number_of_levels_is_that_of_least_error() {
+        let field = smooth(96, 96, 2);
+        let options = Options { gains: Gains::Matched, ..OPTIONS };
+        let error = |levels| fit(&field, &Options { levels, ..options }).unwrap().autocovariance_error;
+        let chosen = fit(&field, &options).unwrap();
+        let errors: Vec<f64> = (1..=3).map(|levels| error(Some(levels))).collect();
+        let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!(errors.iter().all(|&e| e >= chosen.autocovariance_error), "{errors:?}");
+        assert_eq!(
+            errors.get(chosen.levels.len() - 1).copied().unwrap_or(least),
+            chosen.autocovariance_error
+        );
     }
 
     /// A field that grows by 1.3 from row to row, along a diagonal if `shift` is 1.
@@ -285,7 +328,7 @@ mod tests {
     #[test]
     fn an_unstable_neighbourhood_is_shrunk_and_at_last_damped_and_the_model_says_so() {
         for kind in [Kind::Car3d, Kind::Car2d] {
-            let options = Options { kind, levels: Some(1), boundary: Boundary::Mirrored };
+            let options = Options { kind, levels: Some(1), boundary: Boundary::Mirrored, ..OPTIONS };
             // The growth shows to sets with the upper right neighbour only, which begin at four.
             let shrunk = fit(&exploding(1), &options).unwrap();
             // It shows to all sets, and no smaller one is left.

@@ -1,27 +1,35 @@
 //! The probabilistic model of the normal map (section 4 of the paper): a pyramid of causal autoregressive fields,
-//! fitted to a tile by [`fit()`] and sampled at any size by [`Synthesis`].
+//! fitted to a tile by [`Surface::fit`] and sampled at any size by [`Synthesis`].
 //!
 //! ```text
-//! normals ─▶ mean ─▶ (2D: Karhunen-Loeve) ─▶ pyramid ─▶ one CAR field a level ─▶ Model
-//! Model, seed ─▶ one CAR field a level ─▶ collapse ─▶ (2D: inverse) ─▶ mean ─▶ rows
+//! normals ─▶ coordinates ─▶ mean ─▶ (2D: Karhunen-Loeve) ─▶ pyramid ─▶ one CAR field a level
+//!         ─▶ number of levels and their gains by autocovariance ─▶ Model
+//! Model, seed ─▶ one CAR field a level ─▶ collapse ─▶ (2D: inverse) ─▶ mean ─▶ marginals ─▶ rows of normals
 //! ```
 //!
 //! Pure computation in f64; any number of channels; sums in one fixed order, so results are bit-identical.
 
 mod budget;
 pub mod car;
+mod choice;
 pub mod field;
 pub mod fit;
+mod gain;
 pub mod karhunen_loeve;
 mod lattice;
+pub mod marginals;
 pub mod model;
 pub mod neighbourhood;
 pub mod pyramid;
 pub mod recursion;
+pub mod second_order;
+mod spectrum;
 pub mod stability;
+pub mod surface;
 pub mod synthesis;
 
 pub use field::{Boundary, Field};
 pub use fit::fit;
-pub use model::{Kind, Level, Model, Options};
-pub use synthesis::Synthesis;
+pub use model::{Gains, Kind, Level, Model, Options};
+pub use surface::{Coordinates, Surface};
+pub use synthesis::{Extent, Synthesis};

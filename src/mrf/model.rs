@@ -1,6 +1,9 @@
 //! A fitted model: what a synthesis needs, and what the recipe should tell about it.
 
+use std::fmt;
+
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use super::car::{Prior, cholesky};
 use super::field::Boundary;
@@ -11,12 +14,33 @@ use crate::error::{Error, Result};
 const ORTHONORMAL_TOLERANCE: f64 = 1e-6;
 
 /// Whether the channels are modelled together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Kind {
     /// 3D CAR, (9): all channels at once.
+    #[serde(rename = "3d")]
     Car3d,
     /// 2D CAR, (18): one scalar model a channel, after the Karhunen-Loeve transformation.
+    #[serde(rename = "2d")]
     Car2d,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Car3d => "3D CAR",
+            Self::Car2d => "2D CAR",
+        })
+    }
+}
+
+/// How loud each level of a synthesis is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Gains {
+    /// As estimated. The bands of a pyramid overlap, so their sum, drawn independently, has too little spread.
+    None,
+    /// Such that the sum has the second-order statistics of the data, as near as one gain a level can bring it.
+    Matched,
 }
 
 /// What to fit.
@@ -24,9 +48,11 @@ pub enum Kind {
 pub struct Options {
     /// Channels together or one by one.
     pub kind: Kind,
-    /// Pyramid levels; `None` takes as many as keep ten samples per parameter at the coarsest for four neighbours,
-    /// at least 1 and at most 5.
+    /// Pyramid levels; `None` chooses by autocovariance among all numbers that keep ten samples per parameter at the
+    /// coarsest for four neighbours, at least 1 and at most 5.
     pub levels: Option<usize>,
+    /// How loud each level is.
+    pub gains: Gains,
     /// Periodic for a tile that wraps. Otherwise the pyramid is mirrored, and only texels whose neighbours all lie
     /// inside count for the statistics.
     pub boundary: Boundary,
@@ -43,6 +69,11 @@ pub struct Model {
     pub transform: Option<DMatrix<f64>>,
     /// Level 0 is the finest.
     pub levels: Vec<Level>,
+    /// Covariance of the channels that a synthesis has, `[channels, channels]`.
+    pub covariance: DMatrix<f64>,
+    /// Root mean square difference of the autocovariance of a synthesis from that of the data, in units of the
+    /// channels' variances.
+    pub autocovariance_error: f64,
 }
 
 /// The autoregressive field of one pyramid level.
@@ -54,6 +85,8 @@ pub struct Level {
     pub gamma: DMatrix<f64>,
     /// 3D: the covariance of e, `[channels, channels]`. 2D: its variances, `[channels, 1]`.
     pub sigma: DMatrix<f64>,
+    /// What the field is multiplied by before it is added to the others, above 0.
+    pub gain: f64,
     /// The prior that the estimates hold.
     pub prior: Prior,
     /// Log evidence of the neighbourhood, the sum over channels if 2D.
@@ -82,8 +115,11 @@ impl Model {
         if channels == 0 || self.levels.is_empty() {
             return Err(Error::input("a field model needs at least one channel and one level"));
         }
-        if !self.mean.iter().all(|value| value.is_finite()) {
-            return Err(Error::input("the mean of a field model is not finite"));
+        if !self.mean.iter().chain(self.covariance.iter()).all(|value| value.is_finite()) {
+            return Err(Error::input("the mean or the covariance of a field model is not finite"));
+        }
+        if self.covariance.shape() != (channels, channels) {
+            return Err(Error::input(format!("a field model of {channels} channels has another covariance")));
         }
         match (self.kind, &self.transform) {
             (Kind::Car3d, None) => {}
@@ -112,11 +148,12 @@ impl Model {
 }
 
 impl Level {
-    /// Gamma `[channels, channels * sites]` and Sigma `[channels, channels]` of all channels together. Scalar models
-    /// become diagonal blocks, so what reads these need not know the kind.
+    /// Gamma `[channels, channels * sites]` and Sigma `[channels, channels]` of all channels together, at the level's
+    /// gain. Scalar models become diagonal blocks, so what reads these need not know the kind.
     pub(super) fn joint(&self, kind: Kind) -> (DMatrix<f64>, DMatrix<f64>) {
+        let sigma = &self.sigma * (self.gain * self.gain);
         if kind == Kind::Car3d {
-            return (self.gamma.clone(), self.sigma.clone());
+            return (self.gamma.clone(), sigma);
         }
         let (channels, sites) = self.gamma.shape();
         let mut gamma = DMatrix::zeros(channels, channels * sites);
@@ -125,7 +162,7 @@ impl Level {
                 gamma[(i, s * channels + i)] = self.gamma[(i, s)];
             }
         }
-        (gamma, DMatrix::from_diagonal(&self.sigma.column(0).into_owned()))
+        (gamma, DMatrix::from_diagonal(&sigma.column(0).into_owned()))
     }
 
     /// The spectral radius of the field, of its worst channel if 2D.
@@ -147,6 +184,9 @@ impl Level {
             if !matrix.iter().all(|value| value.is_finite()) {
                 return Err(Error::input(format!("{name} is not finite")));
             }
+        }
+        if !(self.gain.is_finite() && self.gain > 0.0) {
+            return Err(Error::input(format!("the gain is {}, expected a finite number above 0", self.gain)));
         }
         cholesky(self.joint(kind).1).map_err(|error| error.context("sigma"))?;
         let radius = self.measure_radius(kind)?;
@@ -172,6 +212,7 @@ pub(super) mod tests {
             neighbourhood: sites.to_vec(),
             gamma: DMatrix::from_row_slice(channels, gamma.len() / channels, gamma),
             sigma: DMatrix::from_row_slice(channels, sigma.len() / channels, sigma),
+            gain: 1.0,
             prior: Prior::weak(1.0, channels),
             log_evidence: 0.0,
             radius: 0.5,
@@ -179,7 +220,9 @@ pub(super) mod tests {
             note: None,
         };
         let transform = (kind == Kind::Car2d).then(|| DMatrix::identity(channels, channels));
-        Model { kind, mean: vec![0.0; channels], transform, levels: vec![level] }
+        let covariance = DMatrix::identity(channels, channels);
+        let mean = vec![0.0; channels];
+        Model { kind, mean, transform, levels: vec![level], covariance, autocovariance_error: 0.0 }
     }
 
     #[test]
@@ -195,8 +238,10 @@ pub(super) mod tests {
     fn damaged_models_are_refused() {
         let sound = single(Kind::Car3d, &[[0, 1]], &[0.5, 0.1, 0.0, 0.5], &[1.0, 0.3, 0.3, 1.0]);
         sound.check().unwrap();
-        let damages: [fn(&mut Model); 9] = [
+        let damages: [fn(&mut Model); 11] = [
             |m| m.levels.clear(),
+            |m| m.levels[0].gain = 0.0,
+            |m| m.covariance = DMatrix::identity(3, 3),
             |m| m.mean[0] = f64::INFINITY,
             |m| m.transform = Some(DMatrix::identity(2, 2)),
             |m| m.kind = Kind::Car2d,

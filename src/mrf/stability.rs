@@ -20,7 +20,7 @@ const SQUARINGS: usize = 16;
 
 /// A field counts as stable below this radius. Closer to 1 a disturbance outlasts every margin, and the grid of
 /// frequencies might miss a peak that reaches 1.
-pub const STABLE_RADIUS: f64 = 0.999;
+pub const STABLE_RADIUS: f64 = 0.996;
 
 type Matrix = DMatrix<Complex<f64>>;
 

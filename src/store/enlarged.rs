@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
@@ -98,9 +99,10 @@ impl Enlarged {
         })
     }
 
-    /// Writes a row of shards: `index` [rows, width], `normals` [rows, width, 3] where they are kept.
+    /// Writes a row of shards: `index` [rows, width], `normals` [rows, width, 3] where they are kept. Shards are
+    /// packed on all threads of the pool.
     pub fn write_shard_row(&self, shard_row: usize, index: &[u16], normals: &[f32]) -> Result<()> {
-        for sx in 0..self.size.width.div_ceil(SHARD_SIDE) {
+        let write = |sx: usize| {
             let place = [shard_row as u64, sx as u64];
             if let Some(array) = &self.normals {
                 let shard = self.cut(normals, sx, 3);
@@ -108,16 +110,12 @@ impl Enlarged {
             }
             let shard = self.cut(index, sx, 1);
             if self.wide {
-                self.store.write_chunk(&self.index, &place, shard)?;
-            } else {
-                self.store.write_chunk(
-                    &self.index,
-                    &place,
-                    shard.iter().map(|&c| c as u8).collect::<Vec<u8>>(),
-                )?;
+                return self.store.write_chunk(&self.index, &place, shard);
             }
-        }
-        Ok(())
+            let narrow: Vec<u8> = shard.iter().map(|&cluster| cluster as u8).collect();
+            self.store.write_chunk(&self.index, &place, narrow)
+        };
+        (0..self.size.width.div_ceil(SHARD_SIDE)).into_par_iter().try_for_each(write)
     }
 
     /// One shard of a row of shards, padded by zeros to its full size.

@@ -1,16 +1,23 @@
 //! The random field of a model store: the arrays under `mrf/` and what the attributes tell of them.
+//!
+//! | array | shape | |
+//! | --- | --- | --- |
+//! | `mrf/mean` | [channel] | of the data |
+//! | `mrf/transform` | [component, channel] | T of (15), 2D only |
+//! | `mrf/covariance` | [channel, channel] | of a synthesis |
+//! | `mrf/gain` | [level] | what each level is multiplied by |
+//! | `mrf/marginals` | [z1, z2, 2] | (n_x, n_y) of standardised values, where matched |
+//! | `mrf/level_<k>/gamma`, `sigma`, `neighbourhood` | | (9) or (18) |
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use serde_json::Map;
+use serde_json::{Map, json};
 
 use crate::error::{Error, Result};
 use crate::mrf::car::Prior;
-use crate::mrf::{Kind, Level, Model};
+use crate::mrf::marginals::{Marginals, Matching, NODES};
+use crate::mrf::{Coordinates, Kind, Level, Model, Surface};
 use crate::store::{Layout, Store};
-
-/// Channels of a field of normals.
-const NORMAL_COMPONENTS: usize = 3;
 
 /// Farthest site that a stored neighbourhood may have: rows as far back are kept in memory.
 const FARTHEST_SITE: u32 = 64;
@@ -19,7 +26,14 @@ const FARTHEST_SITE: u32 = 64;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FieldReport {
     /// `3d` or `2d`.
-    pub mrf: String,
+    pub mrf: Kind,
+    /// What the channels are.
+    pub field: Coordinates,
+    /// What of the tile's distribution is given to a synthesis.
+    pub marginals: Option<Matching>,
+    /// Root mean square difference of the autocovariance of a synthesis from the data's, in units of the channels'
+    /// variances.
+    pub autocovariance_error: f64,
     /// Level 0 is the finest.
     pub levels: Vec<LevelReport>,
 }
@@ -31,6 +45,8 @@ pub struct LevelReport {
     pub size: [usize; 2],
     /// Number of sites of the neighbourhood.
     pub eta: usize,
+    /// What the level is multiplied by.
+    pub gain: f64,
     /// Log evidence of that neighbourhood.
     pub log_evidence: f64,
     /// Spectral radius of the recursion; below 1 is stable.
@@ -48,11 +64,12 @@ pub struct LevelReport {
 }
 
 impl FieldReport {
-    /// The report of a fitted field.
-    pub fn new(field: &Model) -> Self {
+    /// The report of a fitted surface.
+    pub fn new(surface: &Surface) -> Self {
         let level = |level: &Level| LevelReport {
             size: level.size,
             eta: level.neighbourhood.len(),
+            gain: level.gain,
             log_evidence: level.log_evidence,
             radius: level.radius,
             note: level.note.clone(),
@@ -61,23 +78,35 @@ impl FieldReport {
             prior_beta: level.prior.beta,
             prior_degrees: level.prior.degrees,
         };
-        let mrf = if field.kind == Kind::Car2d { "2d" } else { "3d" };
-        Self { mrf: mrf.to_owned(), levels: field.levels.iter().map(level).collect() }
-    }
-
-    fn kind(&self) -> Kind {
-        if self.mrf == "2d" { Kind::Car2d } else { Kind::Car3d }
+        Self {
+            mrf: surface.field.kind,
+            field: surface.coordinates,
+            marginals: surface.marginals.as_ref().map(Marginals::matching),
+            autocovariance_error: surface.field.autocovariance_error,
+            levels: surface.field.levels.iter().map(level).collect(),
+        }
     }
 }
 
-/// Writes a field model under `mrf/`.
-pub(super) fn write(store: &Store, field: &Model) -> Result<()> {
+/// Writes a surface's model under `mrf/`.
+pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
+    let field = &surface.field;
     store.write_group("mrf", Map::new())?;
-    let channels = field.mean.len();
+    let channels = field.channels();
     store.write("mrf/mean", &Layout::small::<f64>(&["channel"], &[channels]), &field.mean)?;
     if let Some(transform) = &field.transform {
         let layout = Layout::small::<f64>(&["component", "channel"], &[channels, channels]);
         store.write("mrf/transform", &layout, &rows(transform))?;
+    }
+    let square = Layout::small::<f64>(&["channel", "channel_other"], &[channels, channels]);
+    store.write("mrf/covariance", &square, &rows(&field.covariance))?;
+    let gains: Vec<f64> = field.levels.iter().map(|level| level.gain).collect();
+    store.write("mrf/gain", &Layout::small::<f64>(&["level"], &[gains.len()]), &gains)?;
+    if let Some(marginals) = &surface.marginals {
+        let mut layout = Layout::small::<f32>(&["z1", "z2", "xy"], &[NODES, NODES, 2]);
+        layout.attributes.insert("z".to_owned(), json!("-4 to 4 in steps of 1/16"));
+        let table: Vec<f32> = marginals.table().iter().flatten().copied().collect();
+        store.write("mrf/marginals", &layout, &table)?;
     }
     for (number, level) in field.levels.iter().enumerate() {
         let group = format!("mrf/level_{number}");
@@ -97,38 +126,42 @@ pub(super) fn write(store: &Store, field: &Model) -> Result<()> {
     Ok(())
 }
 
-/// Reads a field model; `report` is that of stage `fit`.
-pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Model> {
-    let (_, mean) = store.read::<f64>("mrf/mean", &[0])?;
-    let channels = mean.len();
-    if channels != NORMAL_COMPONENTS {
-        return Err(Error::input(format!(
-            "{}: mrf/mean: got {channels} channels, expected {NORMAL_COMPONENTS}",
-            store.path().display()
-        )));
-    }
-    let kind = report.kind();
-    let transform = match kind {
-        Kind::Car3d => None,
-        Kind::Car2d => {
-            let (_, values) = store.read::<f64>("mrf/transform", &[channels, channels])?;
-            Some(DMatrix::from_row_slice(channels, channels, &values))
-        }
+/// Reads a surface's model; `report` is that of stage `fit`.
+pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
+    let (kind, coordinates) = (report.mrf, report.field);
+    let channels = coordinates.channels();
+    let square = |name: &str| -> Result<DMatrix<f64>> {
+        let (_, values) = store.read::<f64>(name, &[channels, channels])?;
+        Ok(DMatrix::from_row_slice(channels, channels, &values))
     };
+    let (_, mean) = store.read::<f64>("mrf/mean", &[channels])?;
+    let transform = (kind == Kind::Car2d).then(|| square("mrf/transform")).transpose()?;
+    let covariance = square("mrf/covariance")?;
+    let (_, gains) = store.read::<f64>("mrf/gain", &[report.levels.len()])?;
     let levels = report
         .levels
         .iter()
+        .zip(gains)
         .enumerate()
-        .map(|(number, report)| read_level(store, number, kind, channels, report))
+        .map(|(number, (report, gain))| read_level(store, number, gain, kind, channels, report))
         .collect::<Result<Vec<Level>>>()?;
-    let field = Model { kind, mean, transform, levels };
+    let autocovariance_error = report.autocovariance_error;
+    let field = Model { kind, mean, transform, levels, covariance, autocovariance_error };
     field.check().map_err(|error| error.context(store.path().display()))?;
-    Ok(field)
+    let read_marginals = |matching| {
+        let (_, values) = store.read::<f32>("mrf/marginals", &[NODES, NODES, 2])?;
+        let table = values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
+        Marginals::from_table(matching, table, &field.mean, &field.covariance)
+            .map_err(|error| error.context(format!("{}: mrf/marginals", store.path().display())))
+    };
+    let marginals = report.marginals.map(read_marginals).transpose()?;
+    Ok(Surface { coordinates, field, marginals })
 }
 
 fn read_level(
     store: &Store,
     number: usize,
+    gain: f64,
     kind: Kind,
     channels: usize,
     report: &LevelReport,
@@ -153,6 +186,7 @@ fn read_level(
         neighbourhood,
         gamma: DMatrix::from_row_slice(channels, columns, &gamma),
         sigma: DMatrix::from_row_slice(channels, sigma.len() / channels, &sigma),
+        gain,
         prior: Prior {
             xx: report.prior_v_xx,
             yy: report.prior_v_yy,

@@ -3,6 +3,7 @@
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
 pub mod codec;
+pub mod enlarge_state;
 pub mod enlarged;
 pub mod field;
 pub mod gather;

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
-use crate::mrf::Model as FieldModel;
+use crate::mrf::Surface;
 use crate::run::recipe;
 use crate::shape::Size;
 use crate::store::field;
@@ -336,12 +336,12 @@ impl Model {
     }
 
     /// Writes the random field model under `mrf/`.
-    pub fn write_field(&self, model: &FieldModel) -> Result<()> {
-        field::write(&self.store, model)
+    pub fn write_surface(&self, surface: &Surface) -> Result<()> {
+        field::write(&self.store, surface)
     }
 
     /// The random field model.
-    pub fn field(&self) -> Result<FieldModel> {
+    pub fn surface(&self) -> Result<Surface> {
         field::read(&self.store, &self.report(Stage::Fit)?)
     }
 }

@@ -132,13 +132,10 @@ pub(super) fn clusters(figures: &Figures) -> Section {
 pub(super) fn normals(figures: &Figures) -> Section {
     let intro = format!(
         "<p>Photometric stereo under the {} lights of the frontal view gives the tile's normal map. A \
-         pyramid of causal autoregressive fields ({} CAR) is fitted to it, each level with the neighbourhood \
+         pyramid of causal autoregressive fields ({}) is fitted to it, each level with the neighbourhood \
          of highest evidence, and synthesises normals for a plane of any size. Their root mean square angle \
          from the mean normal is {:.1}° in the tile and <b>{:.1}°</b> synthesised.</p>",
-        figures.normals.lights,
-        figures.field.mrf.to_uppercase(),
-        figures.normals.spread_deg,
-        figures.synthesised_spread_deg
+        figures.normals.lights, figures.field.mrf, figures.normals.spread_deg, figures.synthesised_spread_deg
     );
     let shots = vec![
         shot(

@@ -1,0 +1,173 @@
+use std::path::{Path, PathBuf};
+
+use btfkit::error::{Error, Result};
+use btfkit::mrf;
+use btfkit::mrf::marginals::Matching;
+use btfkit::run::Context;
+use btfkit::stage::fit::statistics::{COMPONENTS, Figures};
+use btfkit::stage::fit::{self, sheet};
+use btfkit::store::field::FieldReport;
+use clap::{Args, ValueEnum};
+
+use super::Tell;
+use super::table::{row, table};
+
+/// Fit the random field to a model's normal map
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf fit wood.model.zarr
+  btf fit wood.model.zarr --mrf 2d --field slopes --report wood-field
+  btf fit wood.model.zarr --gains none --marginals none           the paper as it is written
+--report NAME synthesises 512x512 normals and writes how like the tile's they are: the distribution of each
+component, autocorrelation and spread in each band of the pyramid, as NAME.txt and NAME.png.")]
+pub(super) struct Fit {
+    /// The model with the normal map
+    model: PathBuf,
+    #[command(flatten)]
+    options: FitOptions,
+    /// Write how like the tile a synthesis is, as NAME.txt and NAME.png
+    #[arg(long, value_name = "NAME")]
+    report: Option<PathBuf>,
+    /// Only say what would be done
+    #[arg(long)]
+    dry_run: bool,
+}
+
+#[derive(Args)]
+pub(super) struct FitOptions {
+    /// Random field: all channels together, or one by one after the Karhunen-Loeve transform
+    #[arg(long, value_enum, default_value = "3d")]
+    mrf: Kind,
+    /// Levels of the pyramid [default: 1 to 5, whichever keeps the autocovariance best]
+    #[arg(long)]
+    levels: Option<usize>,
+    /// What is modelled: the three components of the normals, or two slopes
+    #[arg(long, value_enum, default_value = "normals")]
+    field: Field,
+    /// How loud each level is: so that their sum has the statistics of the tile, or as estimated
+    #[arg(long, value_enum, default_value = "matched")]
+    gains: Gains,
+    /// What a synthesis takes over of the tile's distribution of normals: that of n_x and n_y together, of each, or
+    /// nothing, as in the paper
+    #[arg(long, value_enum, default_value = "joint")]
+    marginals: Marginals,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kind {
+    #[value(name = "3d")]
+    Car3d,
+    #[value(name = "2d")]
+    Car2d,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Field {
+    Normals,
+    Slopes,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Gains {
+    Matched,
+    None,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Marginals {
+    Joint,
+    Channel,
+    None,
+}
+
+impl Fit {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let plan = fit_plan(&self.model, &self.options)?;
+        if self.dry_run {
+            return tell.plan(&plan.summary());
+        }
+        tell_field(&plan.run(context)?, tell);
+        let Some(name) = &self.report else { return Ok(()) };
+        let comparison = fit::compare(&self.model, context)?;
+        let text = figures_text(&comparison.figures());
+        let file = |ending: &str| PathBuf::from(format!("{}.{ending}", name.display()));
+        std::fs::write(file("txt"), format!("{text}\n"))
+            .map_err(|error| Error::io("write", &file("txt"), error))?;
+        let title = self.model.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        sheet::draw(&comparison, &title).write(&file("png"))?;
+        tell.line(text);
+        Ok(())
+    }
+}
+
+pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> {
+    fit::plan(&fit::Options {
+        model: model.into(),
+        kind: match options.mrf {
+            Kind::Car3d => mrf::Kind::Car3d,
+            Kind::Car2d => mrf::Kind::Car2d,
+        },
+        levels: options.levels,
+        coordinates: match options.field {
+            Field::Normals => mrf::Coordinates::Normals,
+            Field::Slopes => mrf::Coordinates::Slopes,
+        },
+        gains: match options.gains {
+            Gains::Matched => mrf::Gains::Matched,
+            Gains::None => mrf::Gains::None,
+        },
+        matching: match options.marginals {
+            Marginals::Joint => Some(Matching::Joint),
+            Marginals::Channel => Some(Matching::Channel),
+            Marginals::None => None,
+        },
+    })
+}
+
+pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
+    let levels: Vec<String> = report
+        .levels
+        .iter()
+        .map(|level| {
+            let [height, width] = level.size;
+            format!("{width}x{height} eta {} radius {:.3} gain {:.2}", level.eta, level.radius, level.gain)
+        })
+        .collect();
+    tell.line(format!("field     {}; {}", report.mrf, levels.join(", ")));
+    tell.line(format!("          error of its autocovariance {:.3}", report.autocovariance_error));
+    for (number, level) in report.levels.iter().enumerate() {
+        if let Some(note) = &level.note {
+            tell.line(format!("          level {number}: {note}"));
+        }
+    }
+}
+
+/// The figures of both normal maps, those of the tile first.
+fn figures_text(figures: &Figures) -> String {
+    let mut rows = vec![row!["", "mean", "", "spread", "", "skewness", "", "distance"]];
+    rows.push(row!["", "tile", "synth.", "tile", "synth.", "tile", "synth.", ""]);
+    for (name, component) in COMPONENTS.iter().zip(&figures.components) {
+        let [mean, spread, skewness] = [component.mean, component.spread, component.skewness];
+        let [m0, m1, s0, s1] = [mean[0], mean[1], spread[0], spread[1]].map(|value| format!("{value:.3}"));
+        let [k0, k1] = skewness.map(|value| format!("{value:.2}"));
+        rows.push(row![name, m0, m1, s0, s1, k0, k1, format!("{:.4}", component.distance)]);
+    }
+    let mut bands = vec![row!["spread in band", "n_x", "", "n_y", "", "n_z", ""]];
+    for (number, [tile, synthesis]) in figures.bands.iter().enumerate() {
+        let mut cells = vec![number.to_string()];
+        for axis in 0..3 {
+            cells.push(format!("{:.4}", tile[axis]));
+            cells.push(format!("{:.4}", synthesis[axis]));
+        }
+        bands.push(cells);
+    }
+    let [tile, synthesis] = figures.correlation;
+    format!(
+        "{}\ncorrelation of n_x and n_y {tile:.3}, synthesised {synthesis:.3}\n\
+         error of the autocovariance {:.3}\n{}",
+        table(&rows),
+        figures.autocovariance_error,
+        table(&bands)
+    )
+}

@@ -1,0 +1,110 @@
+//! Normal map to random field: pyramid, neighbourhoods by evidence, 3D CAR or 2D CAR.
+
+pub mod sheet;
+pub mod statistics;
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::error::Result;
+use crate::mrf::marginals::Matching;
+use crate::mrf::{self, Boundary, Coordinates, Gains, Surface};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
+use crate::store::field::FieldReport;
+use crate::store::model::{Model, Stage};
+
+/// How to fit.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The model with the normal map.
+    pub model: PathBuf,
+    /// Channels together or one by one.
+    pub kind: mrf::Kind,
+    /// Levels of the pyramid; as many as the data carry where absent.
+    pub levels: Option<usize>,
+    /// What the channels of the field are.
+    pub coordinates: Coordinates,
+    /// How loud each level is.
+    pub gains: Gains,
+    /// What of the tile's distribution is given to a synthesis.
+    pub matching: Option<Matching>,
+}
+
+impl Options {
+    /// As much as is known to help: 3D CAR of the normals, levels chosen, gains and joint distribution matched.
+    pub fn of(model: PathBuf) -> Self {
+        Self {
+            model,
+            kind: mrf::Kind::Car3d,
+            levels: None,
+            coordinates: Coordinates::Normals,
+            gains: Gains::Matched,
+            matching: Some(Matching::Joint),
+        }
+    }
+}
+
+/// A fit, ready to run.
+pub struct Plan {
+    model: Model,
+    options: Options,
+    recipe: Value,
+}
+
+/// Checks that the model has a normal map.
+pub fn plan(options: &Options) -> Result<Plan> {
+    let model = Model::open(&options.model)?;
+    let normals = model.stage_digest(Stage::Normals)?;
+    let recipe = json!({
+        "stage": "fit", "method": METHOD,
+        "normals": normals,
+        "mrf": options.kind,
+        "levels": options.levels,
+        "field": options.coordinates,
+        "gains": options.gains,
+        "marginals": options.matching,
+    });
+    Ok(Plan { model, options: options.clone(), recipe })
+}
+
+impl Plan {
+    /// What would be done.
+    pub fn summary(&self) -> Value {
+        json!({"stage": "fit", "model": self.model.path(), "recipe": self.recipe})
+    }
+
+    /// Fits the field, unless that is done.
+    pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
+        let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe)? else {
+            return self.model.report(Stage::Fit);
+        };
+        context.progress.begin("fit", 1, Counted::Items("field"));
+        let tile = self.model.tile()?;
+        let normals = self.model.normals()?;
+        let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
+        let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
+        let options = mrf::Options { kind, levels, gains, boundary };
+        let surface =
+            context.install(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
+        self.model.write_surface(&surface)?;
+        let report = FieldReport::new(&surface);
+        self.model.finish(Stage::Fit, &self.recipe, &report)?;
+        context.progress.advance(1);
+        context.progress.end();
+        Ok(report)
+    }
+}
+
+/// The statistics of a fitted model's tile and of a synthesis.
+///
+/// # Errors
+/// When the model is not fitted.
+pub fn compare(model: &Path, context: &Context<'_>) -> Result<statistics::Comparison> {
+    let model = Model::open(model)?;
+    let (tile, normals, surface) = (model.tile()?, model.normals()?, model.surface()?);
+    let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
+    context.install(|| statistics::Comparison::of(&surface, tile.size, normals, boundary))
+}

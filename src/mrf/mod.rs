@@ -6,10 +6,12 @@
 //! Model, seed ─▶ one CAR field a level ─▶ collapse ─▶ (2D: inverse) ─▶ mean ─▶ rows
 //! ```
 //!
-//! Pure computation in f64; any number of channels; sums in one fixed order, so results are bit-identical.
+//! Pure computation, fits in f64 and syntheses in f32; any number of channels; sums in one fixed order, so results are
+//! bit-identical.
 
 mod budget;
 pub mod car;
+mod extent;
 pub mod field;
 pub mod fit;
 pub mod karhunen_loeve;
@@ -21,6 +23,7 @@ pub mod recursion;
 pub mod stability;
 pub mod synthesis;
 
+pub use extent::Extent;
 pub use field::{Boundary, Field};
 pub use fit::fit;
 pub use model::{Kind, Level, Model, Options};

@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::mrf::Synthesis;
+use crate::kernel::Kernel;
+use crate::mrf::{Extent, Synthesis};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
@@ -144,7 +145,14 @@ impl Plan {
         // All that can fail for the model's sake comes before the output is begun.
         let normals = NearestNormals::new(&self.model.normals()?);
         let scan = Scan::new(self.model.index()?, self.model.distance()?);
-        let mut field = Synthesis::new(&self.model.field()?, self.options.seed, height, width)?;
+        let mut field = Synthesis::new(
+            &self.model.field()?,
+            self.options.seed,
+            height,
+            width,
+            Extent::Endless,
+            Kernel::fastest(),
+        )?;
         let output =
             Enlarged::create(&self.options.output, &self.description, &self.recipe, &self.options.model)?;
         let found = (0..output.shard_rows()).take_while(|&row| output.has_shard_row(row)).count();
@@ -218,13 +226,13 @@ fn synthesise(
     for _ in 0..rows {
         context.check_stop()?;
         field.next_row(&mut row)?;
-        band.extend(row.chunks_exact(3).map(unit));
+        band.extend((0..width).map(|x| unit([0, 1, 2].map(|axis| f64::from(row[axis * width + x])))));
     }
     Ok(band)
 }
 
 /// A synthesised vector brought back to unit length; one without direction points up.
-fn unit(vector: &[f64]) -> [f32; 3] {
+fn unit(vector: [f64; 3]) -> [f32; 3] {
     let length = (vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]).sqrt();
-    if length > 0.0 { [0, 1, 2].map(|axis| (vector[axis] / length) as f32) } else { [0.0, 0.0, 1.0] }
+    if length > 0.0 { vector.map(|value| (value / length) as f32) } else { [0.0, 0.0, 1.0] }
 }

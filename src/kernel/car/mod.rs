@@ -161,6 +161,11 @@ impl Field {
         self.close(self.newest);
     }
 
+    /// Channels.
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+
     /// Channel `channel` of the row that lies `above` rows above the newest.
     pub fn row(&self, above: usize, channel: usize) -> &[f32] {
         &self.rows[self.start((self.newest + self.slots - above) % self.slots, channel)..][..self.width]

@@ -7,7 +7,7 @@ use btfkit::color::{LightnessCodes, Transfer};
 use btfkit::kernel::Kernel;
 use btfkit::kernel::counting::{STRIP, lower_medians};
 use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
-use btfkit::mrf::{Boundary, Field, Kind, Options, Synthesis, fit};
+use btfkit::mrf::{Boundary, Extent, Field, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
 use btfkit_formats::{Direction, SampleType, Samples};
@@ -166,7 +166,9 @@ fn synthesis(bencher: Bencher<'_, '_>, kind: Kind) {
     let mut row = vec![0.0; 1024 * 3];
     bencher
         .counter(ItemsCount::new(64usize * 1024))
-        .with_inputs(|| Synthesis::new(&model, 1, 64, 1024).expect("a model that can be synthesised"))
+        .with_inputs(|| {
+            Synthesis::new(&model, 1, 64, 1024, Extent::Endless, Kernel::fastest()).expect("a sound model")
+        })
         .bench_local_values(|mut field| {
             for _ in 0..64 {
                 field.next_row(black_box(&mut row)).expect("64 rows");

@@ -1,11 +1,15 @@
 //! Randomness hashed from place and seed: Philox 4x32-10 (Salmon et al. 2011),
 //! so that a value depends on its counter and key and on nothing else.
 
+use crate::kernel::{Kernel, noise};
+
+/// Constants of Philox 4x32.
+pub(crate) const MULTIPLIER: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
+pub(crate) const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
+
 /// The ten-round Philox function on four 32-bit words.
 #[inline]
 pub fn philox4x32(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
-    const MULTIPLIER: [u64; 2] = [0xD251_1F53, 0xCD9E_8D57];
-    const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
     let [mut c0, mut c1, mut c2, mut c3] = counter;
     let [mut k0, mut k1] = key;
     for _ in 0..10 {
@@ -49,6 +53,12 @@ impl Hash {
         self.uniforms(a, b, c).map(normal_quantile)
     }
 
+    /// Standard normals of columns `first_column ..` of a row in one channel: see [`noise::normals`].
+    pub fn normal_row(&self, kernel: Kernel, row: i32, first_column: i32, channel: u32, out: &mut [f32]) {
+        let Self { key, domain } = *self;
+        noise::normals(kernel, noise::Place { key, domain, row, first_column, channel }, out);
+    }
+
     /// A whole number below `bound` (which must not be 0), from the place (a, b, c).
     #[inline]
     pub fn below(&self, bound: u64, a: u32, b: u32, c: u32) -> u64 {
@@ -60,7 +70,7 @@ impl Hash {
 
 /// Maps a word to the middle of its cell in (0, 1).
 #[inline]
-fn unit_interval(word: u32) -> f64 {
+pub(crate) fn unit_interval(word: u32) -> f64 {
     (f64::from(word) + 0.5) / 4_294_967_296.0
 }
 

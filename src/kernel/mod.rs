@@ -2,7 +2,10 @@
 
 pub mod absolute_difference;
 pub mod bounds;
+pub mod car;
+pub mod collapse;
 pub mod counting;
+pub mod noise;
 pub mod predict;
 pub mod ranking;
 
@@ -11,7 +14,7 @@ pub mod ranking;
 pub enum Kernel {
     /// Whatever the program was compiled for.
     Plain,
-    /// AVX2.
+    /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     #[non_exhaustive] // so that only `available` can vouch for it
     Avx2,
@@ -27,7 +30,7 @@ impl Kernel {
         #[allow(unused_mut)] // grows on x86 only
         let mut kernels = vec![Self::Plain];
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
             kernels.push(Self::Avx2);
             let found = |features: [bool; 3]| features == [true; 3];
             if found([
@@ -57,12 +60,12 @@ macro_rules! compiled_for_each_kernel {
         $(#[$meta])*
         $vis fn $name(kernel: $crate::kernel::Kernel, $($argument: $kind),*) $(-> $result)? {
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
+            #[target_feature(enable = "avx2,fma")]
             fn avx2($($argument: $kind),*) $(-> $result)? {
                 $body($($argument),*)
             }
             #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512bw,avx512vl")]
+            #[target_feature(enable = "avx512f,avx512bw,avx512vl,fma")]
             fn avx512($($argument: $kind),*) $(-> $result)? {
                 $body($($argument),*)
             }

@@ -7,11 +7,13 @@
 //! Model, seed ─▶ one CAR field a level ─▶ collapse ─▶ (2D: inverse) ─▶ mean ─▶ marginals ─▶ rows of normals
 //! ```
 //!
-//! Pure computation in f64; any number of channels; sums in one fixed order, so results are bit-identical.
+//! Pure computation, fits in f64 and syntheses in f32; any number of channels; sums in one fixed order, so results are
+//! bit-identical.
 
 mod budget;
 pub mod car;
 mod choice;
+mod extent;
 pub mod field;
 pub mod fit;
 mod gain;
@@ -28,8 +30,9 @@ pub mod stability;
 pub mod surface;
 pub mod synthesis;
 
+pub use extent::Extent;
 pub use field::{Boundary, Field};
 pub use fit::fit;
 pub use model::{Gains, Kind, Level, Model, Options};
 pub use surface::{Coordinates, Surface};
-pub use synthesis::{Extent, Synthesis};
+pub use synthesis::Synthesis;

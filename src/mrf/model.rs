@@ -148,10 +148,15 @@ impl Model {
 }
 
 impl Level {
+    /// Sigma at the level's gain, shaped as it is.
+    pub(super) fn noise_covariance(&self) -> DMatrix<f64> {
+        &self.sigma * (self.gain * self.gain)
+    }
+
     /// Gamma `[channels, channels * sites]` and Sigma `[channels, channels]` of all channels together, at the level's
     /// gain. Scalar models become diagonal blocks, so what reads these need not know the kind.
     pub(super) fn joint(&self, kind: Kind) -> (DMatrix<f64>, DMatrix<f64>) {
-        let sigma = &self.sigma * (self.gain * self.gain);
+        let sigma = self.noise_covariance();
         if kind == Kind::Car3d {
             return (self.gamma.clone(), sigma);
         }

@@ -104,7 +104,12 @@ fn spectrum_row(
 }
 
 /// R(d) = mean over w of weight(w) S(w) e^(i w d), one axis after the other.
-fn autocovariance(rows: &[Vec<Complex<f64>>], channels: usize, number: usize, lags: Lags) -> Vec<DMatrix<f64>> {
+fn autocovariance(
+    rows: &[Vec<Complex<f64>>],
+    channels: usize,
+    number: usize,
+    lags: Lags,
+) -> Vec<DMatrix<f64>> {
     let square = channels * channels;
     let side = rows[0].len() / square;
     let side_lags = 2 * lags.columns + 1;
@@ -138,7 +143,10 @@ fn autocovariance(rows: &[Vec<Complex<f64>>], channels: usize, number: usize, la
         }
         sum
     };
-    (0..=lags.rows).flat_map(|dy| (0..side_lags).map(move |lag| (dy, lag))).map(|(dy, lag)| at(dy, lag)).collect()
+    (0..=lags.rows)
+        .flat_map(|dy| (0..side_lags).map(move |lag| (dy, lag)))
+        .map(|(dy, lag)| at(dy, lag))
+        .collect()
 }
 
 /// Rows of frequencies that a row of the upper half stands for: itself and, but for 0 and the highest, its conjugate.
@@ -182,7 +190,8 @@ fn variances(rows: &[Vec<Complex<f64>>], channels: usize, number: usize, level: 
     let mut sums = LevelVariances { band: vec![0.0; channels], low_pass: vec![0.0; channels] };
     for (y, row) in rows.iter().enumerate() {
         for (x, spectrum) in row.chunks_exact(channels * channels).enumerate() {
-            let [whole, kept, reduced] = [0, 1, 2].map(|term| stands_for(y, side) * axis[y][term] * axis[x][term]);
+            let [whole, kept, reduced] =
+                [0, 1, 2].map(|term| stands_for(y, side) * axis[y][term] * axis[x][term]);
             for i in 0..channels {
                 let power = spectrum[i * channels + i].re;
                 sums.low_pass[i] += whole * power;
@@ -213,8 +222,7 @@ mod tests {
     use super::*;
     use crate::mrf::model::tests::single;
     use crate::mrf::second_order;
-    use crate::mrf::synthesis::Synthesis;
-    use crate::mrf::{Boundary, Field, Model, pyramid};
+    use crate::mrf::{Boundary, Field, Model, fit, pyramid};
 
     fn model() -> Model {
         let sites = [[0, 1], [1, 0], [1, -1]];
@@ -227,16 +235,13 @@ mod tests {
     }
 
     /// A field of only the level `number`, the finer ones silent.
-    fn synthesised(level: &Level, number: usize) -> Field {
+    fn alone(level: &Level, number: usize) -> Field {
         let mut model = model();
         let mut silent = level.clone();
         silent.sigma *= 1e-12;
         model.levels = vec![silent; number];
         model.levels.push(level.clone());
-        let mut synthesis = Synthesis::new(&model, 3, 1024, 1024).unwrap();
-        let mut samples = vec![0.0; 1024 * 1024 * 2];
-        samples.chunks_exact_mut(2048).for_each(|row| synthesis.next_row(row).unwrap());
-        Field::new(1024, 1024, 2, samples).unwrap()
+        fit::tests::synthesised(&model, 3, 1024, 1024)
     }
 
     #[test]
@@ -245,7 +250,7 @@ mod tests {
         let lags = Lags { rows: 3, columns: 3 };
         for number in [0, 1, 2] {
             let share = Share::of(level, Kind::Car3d, number, 3, lags).unwrap();
-            let (field, _) = synthesised(level, number).centred();
+            let (field, _) = alone(level, number).centred();
             let found = Autocovariance::of_field(&field, Boundary::Mirrored, lags);
             let error = share.autocovariance.error(&found);
             assert!(error < 0.02, "level {number}: {error}");

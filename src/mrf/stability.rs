@@ -56,7 +56,7 @@ pub fn radius(gamma: &DMatrix<f64>, sites: &[[i32; 2]]) -> Result<f64> {
 }
 
 /// Radius of the recursion along a row.
-fn row_radius(gamma: &DMatrix<f64>, sites: &[[i32; 2]]) -> f64 {
+pub(super) fn row_radius(gamma: &DMatrix<f64>, sites: &[[i32; 2]]) -> f64 {
     let channels = gamma.nrows();
     let [_, side] = reach(sites);
     let mut blocks = vec![Matrix::zeros(channels, channels); side];

@@ -1,38 +1,34 @@
 //! Synthesis of a field of any size, row by row in bounded memory: (9) or (18) at each level, the collapse of the
 //! pyramid, (24) and the mean.
 //!
-//! Texel 2r of a level lies on texel r of the next. Each level reaches a little farther than the output, so that the
-//! expansion meets no border, and begins from zeros a margin earlier (top, left and right), which is thrown away: as
-//! many texels as the stability radius takes to bring a disturbance below 1e-3, at least 16, at most 256.
+//! Texel 2r of a level lies on texel r of the next. Each level begins from zeros a margin earlier, which is thrown away:
+//! as many texels as the stability radius takes to bring a disturbance below 1e-3, at least 16, at most 256 (top, left
+//! and right); where the field wraps, as [`Extent::Wrapping`] says.
+//!
+//! All is f32, summed in one order (`kernel::car`, `kernel::collapse`): no kernel and no machine changes a bit.
 
 use std::collections::VecDeque;
 
-use nalgebra::DMatrix;
-
+use super::extent::{self, Extent, Place};
 use super::lattice::Lattice;
 use super::model::Model;
-use super::pyramid::{even, odd};
 use crate::error::{Error, Result};
+use crate::kernel::{Kernel, collapse};
 use crate::random::Hash;
 
 /// Domain of the noise of level 0; level k has this plus k.
 pub const LEVEL_DOMAIN: u32 = 0x4341_5200;
 
-/// What is left of the zero state after the margin.
-const TRANSIENT: f64 = 1e-3;
-const LEAST_MARGIN: usize = 16;
-const MOST_MARGIN: usize = 256;
-
-/// Lattice places are 32-bit, with room for the margins.
-const MOST_TEXELS: usize = 1 << 30;
-
 /// A field that is being synthesised from the top row down.
 ///
-/// The rows depend on the model, the seed and the width only, not on how they are pulled. Memory: a few rows a level.
+/// The rows depend on the model, the seed, the width and (if the field wraps) the height only, not on how they are
+/// pulled. Memory: a few rows a level.
 pub struct Synthesis {
     levels: Vec<Stage>,
-    mean: Vec<f64>,
-    transform: Option<DMatrix<f64>>,
+    kernel: Kernel,
+    mean: Vec<f32>,
+    /// T^-1 = T^T, `[channel][component]`, if there is a T.
+    inverse: Option<Vec<f32>>,
     height: usize,
     width: usize,
     position: usize,
@@ -41,68 +37,64 @@ pub struct Synthesis {
 /// One level: its own field, and the sum of it and all coarser levels.
 struct Stage {
     lattice: Lattice,
-    /// Texels of the lattice's margin at each side.
-    margin: usize,
-    /// Columns of the sum, from lattice column `first_column` on.
-    width: usize,
-    first_column: i32,
+    kernel: Kernel,
+    place: Place,
     channels: usize,
     /// The newest row of the sum, planar.
-    sum: Vec<f64>,
-    /// Three successive rows of the coarser sum, expanded to the columns of this level, the oldest in front.
-    coarser: VecDeque<Vec<f64>>,
+    sum: Vec<f32>,
+    /// Lattice row of the next.
+    next_row: i32,
+    /// Three successive rows of the coarser sum, expanded to the columns of this level, the oldest in front; none at the
+    /// coarsest level.
+    coarser: VecDeque<Vec<f32>>,
     /// Lattice row of the newest of them.
     coarser_row: i32,
 }
 
 impl Synthesis {
-    /// Prepares a field of `height` x `width` texels (each from 1 to 2^30) and generates the margins at the top.
+    /// Prepares a field of `height` x `width` texels (each from 1 to 2^30). The first row comes with the margins above.
     ///
     /// # Errors
-    /// When the model does not pass [`Model::check`], or the size is out of range.
-    pub fn new(model: &Model, seed: u64, height: usize, width: usize) -> Result<Self> {
+    /// When the model does not pass [`Model::check`], or the size is out of range, or cannot wrap.
+    pub fn new(
+        model: &Model,
+        seed: u64,
+        height: usize,
+        width: usize,
+        extent: Extent,
+        kernel: Kernel,
+    ) -> Result<Self> {
         model.check()?;
-        if !(1..=MOST_TEXELS).contains(&height) || !(1..=MOST_TEXELS).contains(&width) {
-            return Err(Error::usage(format!(
-                "a field of {height} x {width} texels: each side must lie between 1 and {MOST_TEXELS}"
-            )));
-        }
+        let channels = model.channels();
+        let places = extent::places(model, height, width, extent)?;
         let mut levels = Vec::new();
-        let (mut first_row, mut first_column, mut last_column) = (0_i32, 0_i32, width as i32 - 1);
-        for (k, level) in model.levels.iter().enumerate() {
-            let margin = margin(level.measure_radius(model.kind)?);
-            let width = (last_column - first_column) as usize + 1;
+        for (k, (level, &place)) in model.levels.iter().zip(&places).enumerate() {
             let hash = Hash::new(seed, LEVEL_DOMAIN.wrapping_add(k as u32));
-            let before = margin as i32;
-            let mut lattice = Lattice::new(
-                level,
-                model.kind,
-                hash,
-                first_row - before,
-                first_column - before,
-                width + 2 * margin,
-            )?;
-            while lattice.next_row() < first_row {
-                lattice.advance();
-            }
-            let channels = model.channels();
-            let (coarser_first_row, coarser_first_column) =
-                (coarser_start(first_row), coarser_start(first_column));
+            let row = vec![0.0; channels * place.width];
+            let coarser = if k + 1 < places.len() { vec![row.clone(); 3] } else { Vec::new() };
             levels.push(Stage {
-                lattice,
-                margin,
-                width,
-                first_column,
+                lattice: Lattice::new(level, model.kind, hash, place.grid, kernel)?,
+                kernel,
+                place,
                 channels,
-                sum: vec![0.0; channels * width],
-                coarser: VecDeque::from(vec![vec![0.0; channels * width]; 3]),
-                coarser_row: coarser_first_row - 1,
+                sum: row,
+                next_row: place.first_row,
+                coarser: coarser.into(),
+                coarser_row: first_coarser_row(place.first_row) - 1,
             });
-            (first_row, first_column) = (coarser_first_row, coarser_first_column);
-            last_column = last_column.div_euclid(2) + 1;
         }
-        let (mean, transform) = (model.mean.clone(), model.transform.clone());
-        Ok(Self { levels, mean, transform, height, width, position: 0 })
+        let mean = model.mean.iter().map(|&value| value as f32).collect();
+        // Column i of T, which lies contiguous, is row i of its transpose.
+        let inverse = model.transform.as_ref().map(|t| t.iter().map(|&value| value as f32).collect());
+        Ok(Self { levels, kernel, mean, inverse, height, width, position: 0 })
+    }
+
+    /// Bytes that such a synthesis holds.
+    ///
+    /// # Errors
+    /// As those of [`Self::new`], but for damage of the model that the size of the rows does not depend on.
+    pub fn memory_bytes(model: &Model, height: usize, width: usize, extent: Extent) -> Result<u64> {
+        Ok(extent::memory_bytes(model, &extent::places(model, height, width, extent)?))
     }
 
     /// The row that [`Self::next_row`] will give, from 0.
@@ -110,11 +102,11 @@ impl Synthesis {
         self.position
     }
 
-    /// Writes the next row, `[width][channels]`.
+    /// Writes the next row, planar: `[channel][width]`.
     ///
     /// # Errors
     /// When the row has another length, or all rows have been given.
-    pub fn next_row(&mut self, row: &mut [f64]) -> Result<()> {
+    pub fn next_row(&mut self, row: &mut [f32]) -> Result<()> {
         let channels = self.mean.len();
         if row.len() != self.width * channels {
             return Err(Error::internal(format!(
@@ -124,15 +116,11 @@ impl Synthesis {
             )));
         }
         self.skip_rows(1)?;
-        let Some(Stage { sum, width, .. }) = self.levels.first() else { return Ok(()) };
-        for (x, texel) in row.chunks_exact_mut(channels).enumerate() {
-            for (i, value) in texel.iter_mut().enumerate() {
-                *value = self.mean[i]
-                    + match &self.transform {
-                        None => sum[i * width + x],
-                        // Row j of T is an eigenvector: T^-1 = T^T.
-                        Some(t) => (0..channels).map(|j| t[(j, i)] * sum[j * width + x]).sum(),
-                    };
+        let Some(Stage { sum, .. }) = self.levels.first() else { return Ok(()) };
+        for (i, (out, &mean)) in row.chunks_exact_mut(self.width).zip(&self.mean).enumerate() {
+            match &self.inverse {
+                None => collapse::mix(self.kernel, &sum[i * self.width..][..self.width], &[1.0], mean, out),
+                Some(t) => collapse::mix(self.kernel, sum, &t[i * channels..][..channels], mean, out),
             }
         }
         Ok(())
@@ -155,20 +143,74 @@ impl Synthesis {
         self.position += count;
         Ok(())
     }
+
+    /// All that the rows from [`Self::position`] on depend on, beside what [`Self::new`] was given: the position (u64),
+    /// then f32 values, little endian.
+    pub fn state(&self) -> Vec<u8> {
+        let rows = self
+            .levels
+            .iter()
+            .flat_map(|stage| stage.lattice.state().chain(stage.coarser.iter().map(Vec::as_slice)).flatten());
+        let mut bytes = (self.position as u64).to_le_bytes().to_vec();
+        bytes.extend(rows.flat_map(|value| value.to_le_bytes()));
+        bytes
+    }
+
+    /// Goes on where another synthesis, made with the same arguments, was when it gave this state.
+    ///
+    /// # Errors
+    /// When the state has another length, a position beyond the height, or values that are not finite. The synthesis is
+    /// then as it was.
+    pub fn restore(&mut self, state: &[u8]) -> Result<()> {
+        let expected =
+            size_of::<u64>() + self.levels.iter().map(Stage::state_len).sum::<usize>() * size_of::<f32>();
+        let (position, values) = match state.split_first_chunk() {
+            Some((position, values)) if state.len() == expected => (u64::from_le_bytes(*position), values),
+            _ => {
+                return Err(Error::input(format!(
+                    "the state of a synthesis has {} bytes, expected {expected}",
+                    state.len()
+                )));
+            }
+        };
+        let position = usize::try_from(position).unwrap_or(usize::MAX);
+        if position > self.height {
+            return Err(Error::input(format!(
+                "the state of a synthesis is that at row {position}, the field has {} rows",
+                self.height
+            )));
+        }
+        let values: Vec<f32> = values.as_chunks().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+        if !values.iter().all(|value| value.is_finite()) {
+            return Err(Error::input("the state of a synthesis holds values that are not finite"));
+        }
+        let (mut rest, mut last_row) = (values.as_slice(), position as i32 - 1);
+        for stage in &mut self.levels {
+            let (values, after) = rest.split_at(stage.state_len());
+            stage.restore((position > 0).then_some(last_row), values);
+            (rest, last_row) = (after, last_coarser_row(last_row));
+        }
+        self.position = position;
+        Ok(())
+    }
 }
 
 /// Makes the next row of the sum of the first level and all after it.
 fn advance(levels: &mut [Stage]) {
     let Some((stage, coarser)) = levels.split_first_mut() else { return };
-    let row = stage.lattice.next_row();
-    stage.lattice.advance();
-    for (i, sum) in stage.sum.chunks_exact_mut(stage.width).enumerate() {
-        sum.copy_from_slice(&stage.lattice.newest(i)[stage.margin..][..stage.width]);
+    let row = stage.next_row;
+    stage.next_row += 1;
+    // At first the margin too.
+    while stage.lattice.next_row() <= row {
+        stage.lattice.advance();
+    }
+    for (i, sum) in stage.sum.chunks_exact_mut(stage.place.width).enumerate() {
+        stage.lattice.copy(i, stage.place.first_column, sum);
     }
     if coarser.is_empty() {
         return;
     }
-    while stage.coarser_row < row.div_euclid(2) + 1 {
+    while stage.coarser_row < last_coarser_row(row) {
         advance(coarser);
         stage.take_coarser(&coarser[0]);
     }
@@ -179,17 +221,10 @@ impl Stage {
     /// Expands the newest row of the coarser sum along x and keeps it in place of the oldest.
     fn take_coarser(&mut self, coarser: &Self) {
         let mut expanded = self.coarser.pop_front().unwrap_or_default();
-        for i in 0..self.channels {
-            let from = &coarser.sum[i * coarser.width..][..coarser.width];
-            for (x, value) in expanded[i * self.width..][..self.width].iter_mut().enumerate() {
-                let column = self.first_column + x as i32;
-                let here = (column.div_euclid(2) - coarser.first_column) as usize;
-                *value = if column.rem_euclid(2) == 0 {
-                    even(from[here - 1], from[here], from[here + 1])
-                } else {
-                    odd(from[here], from[here + 1])
-                };
-            }
+        let first = (self.place.first_column / 2 - 1 - coarser.place.first_column) as usize;
+        let rows = coarser.sum.chunks_exact(coarser.place.width);
+        for (from, to) in rows.zip(expanded.chunks_exact_mut(self.place.width)) {
+            collapse::spread(self.kernel, &from[first..], to);
         }
         self.coarser.push_back(expanded);
         self.coarser_row += 1;
@@ -197,177 +232,41 @@ impl Stage {
 
     /// Expands the three kept rows along y onto lattice row `row` and adds them.
     fn add_coarser(&mut self, row: i32) {
-        let [before, here, after] = [0, 1, 2].map(|n| &self.coarser[n]);
-        let is_even = row.rem_euclid(2) == 0;
-        for (x, sum) in self.sum.iter_mut().enumerate() {
-            *sum += if is_even { even(before[x], here[x], after[x]) } else { odd(here[x], after[x]) };
+        let [before, here, after] = [0, 1, 2].map(|n| self.coarser[n].as_slice());
+        if row.rem_euclid(2) == 0 {
+            collapse::add_even(self.kernel, [before, here, after], &mut self.sum);
+        } else {
+            collapse::add_odd(self.kernel, [here, after], &mut self.sum);
+        }
+    }
+
+    /// Values of the state.
+    fn state_len(&self) -> usize {
+        self.lattice.state_len() + self.coarser.len() * self.channels * self.place.width
+    }
+
+    /// Goes on after row `last_row`, if there was one.
+    fn restore(&mut self, last_row: Option<i32>, values: &[f32]) {
+        let (first_row, start) = (self.place.first_row, self.place.grid.first_row);
+        self.next_row = last_row.map_or(first_row, |row| row + 1);
+        self.coarser_row = last_row.map_or(first_coarser_row(first_row) - 1, last_coarser_row);
+        let (lattice, rows) = values.split_at(self.lattice.state_len());
+        self.lattice.restore(last_row.map_or(start, |row| row + 1), lattice);
+        for (to, from) in self.coarser.iter_mut().zip(rows.chunks_exact(self.channels * self.place.width)) {
+            to.copy_from_slice(from);
         }
     }
 }
 
-/// First coarse position that the expansion at fine position `first` and after it reads.
-fn coarser_start(first: i32) -> i32 {
+/// First coarse row that the expansion at fine row `first` reads.
+fn first_coarser_row(first: i32) -> i32 {
     first.div_euclid(2) - 1
 }
 
-/// Texels after which a disturbance that decays as radius^n is below [`TRANSIENT`], within limits.
-fn margin(radius: f64) -> usize {
-    if radius <= 0.0 {
-        return LEAST_MARGIN;
-    }
-    let texels = (libm::log(TRANSIENT) / libm::log(radius)).ceil();
-    (texels as usize).clamp(LEAST_MARGIN, MOST_MARGIN)
+/// Last coarse row that the expansion at fine row `last` is given.
+fn last_coarser_row(last: i32) -> i32 {
+    last.div_euclid(2) + 1
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use crate::mrf::field::{Boundary, Field};
-    use crate::mrf::model::tests::single;
-    use crate::mrf::{Kind, pyramid};
-
-    /// Three levels of two channels with different fields.
-    fn model() -> Model {
-        let sites = [[0, 1], [1, 0], [1, -1]];
-        let gamma = [0.5, 0.1, 0.3, 0.0, 0.1, -0.05, -0.2, 0.4, 0.1, 0.3, 0.0, 0.1];
-        let mut model = single(Kind::Car3d, &sites, &gamma, &[1.0, 0.4, 0.4, 0.5]);
-        model.mean = vec![0.25, -3.0];
-        for factor in [0.9, -0.7] {
-            let mut level = model.levels[0].clone();
-            level.gamma *= factor;
-            model.levels.push(level);
-        }
-        model
-    }
-
-    fn synthesised(model: &Model, seed: u64, height: usize, width: usize) -> Field {
-        let channels = model.channels();
-        let mut synthesis = Synthesis::new(model, seed, height, width).unwrap();
-        let mut samples = vec![0.0; height * width * channels];
-        samples.chunks_exact_mut(width * channels).for_each(|row| synthesis.next_row(row).unwrap());
-        Field::new(height, width, channels, samples).unwrap()
-    }
-
-    #[test]
-    fn the_same_seed_gives_the_same_bytes_and_another_seed_does_not() {
-        let model = model();
-        let bits =
-            |seed| synthesised(&model, seed, 37, 41).samples.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-        assert_eq!(bits(5), bits(5));
-        assert_ne!(bits(5), bits(6));
-    }
-
-    #[test]
-    fn rows_do_not_depend_on_how_they_are_pulled_nor_on_the_height() {
-        let model = model();
-        let whole = synthesised(&model, 5, 60, 33);
-        let mut row = vec![0.0; 66];
-        for skipped in [1, 2, 7, 58] {
-            let mut synthesis = Synthesis::new(&model, 5, 2000, 33).unwrap();
-            synthesis.skip_rows(skipped).unwrap();
-            assert_eq!(synthesis.position(), skipped);
-            synthesis.next_row(&mut row).unwrap();
-            assert_eq!(row, whole.samples[skipped * 66..(skipped + 1) * 66]);
-        }
-    }
-
-    /// Against the pyramid of whole fields: the levels, made large enough that no border is near, collapse to the same.
-    #[test]
-    fn the_streamed_collapse_is_that_of_the_pyramid() {
-        let model = model();
-        let found = synthesised(&model, 9, 21, 24);
-        // Fields on the lattices from (-16, -16), (-8, -8) and (-4, -4) on, in the coordinates of the output.
-        let mut bands = Vec::new();
-        for (k, level) in model.levels.iter().enumerate() {
-            let start = 16 >> k;
-            let (height, width) = (60_usize.div_ceil(1 << k), 64 >> k);
-            let stage = &Synthesis::new(&model, 9, 21, 24).unwrap().levels[k];
-            let left = stage.margin as i32 - stage.first_column;
-            let total = stage.width + 2 * stage.margin;
-            let hash = Hash::new(9, LEVEL_DOMAIN + k as u32);
-            let mut lattice =
-                Lattice::new(level, model.kind, hash, [0, -1, -2][k] - stage.margin as i32, -left, total)
-                    .unwrap();
-            let mut band = Field::new(height, width, 2, vec![0.0; height * width * 2]).unwrap();
-            while lattice.next_row() < height as i32 - start {
-                let y = lattice.next_row() + start;
-                lattice.advance();
-                for x in 0..width {
-                    let column = x as i32 - start + left;
-                    for c in 0..2 {
-                        if y >= 0 && (0..total as i32).contains(&column) {
-                            band.samples[(y as usize * width + x) * 2 + c] =
-                                lattice.newest(c)[column as usize];
-                        }
-                    }
-                }
-            }
-            bands.push(band);
-        }
-        let whole = pyramid::collapse(&bands, Boundary::Mirrored).unwrap();
-        for y in 0..21 {
-            for x in 0..24 {
-                for c in 0..2 {
-                    let expected = whole.texel(y + 16, x + 16)[c] + model.mean[c];
-                    assert!((found.texel(y, x)[c] - expected).abs() < 1e-12, "row {y}, column {x}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_inverse_transformation_and_the_mean_are_applied() {
-        let mut model = single(Kind::Car2d, &[[0, 1]], &[0.5, 0.2], &[4.0, 1.0]);
-        let plain = synthesised(&model, 3, 4, 5);
-        model.transform = Some(DMatrix::from_row_slice(2, 2, &[0.6, 0.8, -0.8, 0.6]));
-        model.mean = vec![10.0, 20.0];
-        let turned = synthesised(&model, 3, 4, 5);
-        for (a, b) in plain.samples.chunks(2).zip(turned.samples.chunks(2)) {
-            assert!((b[0] - (10.0 + 0.6 * a[0] - 0.8 * a[1])).abs() < 1e-12);
-            assert!((b[1] - (20.0 + 0.8 * a[0] + 0.6 * a[1])).abs() < 1e-12);
-        }
-    }
-
-    #[test]
-    fn a_long_field_neither_fades_nor_drifts_and_its_edges_are_like_its_middle() {
-        // Separable with a = b = 0.8: variance 1 / (1 - 0.64)^2.
-        let model = single(Kind::Car3d, &[[0, 1], [1, 0], [1, 1]], &[0.8, 0.8, -0.64], &[1.0]);
-        let field = synthesised(&model, 8, 4000, 200);
-        let expected = 1.0 / (0.36 * 0.36);
-        let variance = |values: &mut dyn Iterator<Item = f64>| {
-            let (sum, count) = values.fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));
-            sum / count
-        };
-        let samples = &field.samples;
-        let first = variance(&mut samples[..500 * 200].iter().copied());
-        let last = variance(&mut samples[3500 * 200..].iter().copied());
-        assert!(
-            (first / expected - 1.0).abs() < 0.1 && (last / expected - 1.0).abs() < 0.1,
-            "{first}, {last}"
-        );
-        for column in [0, 199] {
-            let edge = variance(&mut samples.iter().skip(column).step_by(200).copied());
-            assert!((edge / expected - 1.0).abs() < 0.2, "column {column}: {edge}");
-        }
-    }
-
-    #[test]
-    fn margins_follow_the_radius_within_limits() {
-        assert_eq!([0.0, 0.5, 0.9, 0.95, 0.998].map(margin), [16, 16, 66, 135, 256]);
-    }
-
-    #[test]
-    fn wrong_sizes_and_unstable_models_are_refused() {
-        let mut model = model();
-        assert!(Synthesis::new(&model, 1, 0, 5).is_err());
-        assert!(Synthesis::new(&model, 1, 5, usize::MAX).is_err());
-        let mut synthesis = Synthesis::new(&model, 1, 2, 5).unwrap();
-        assert!(synthesis.next_row(&mut [0.0; 9]).is_err());
-        assert!(synthesis.skip_rows(3).is_err());
-        synthesis.skip_rows(2).unwrap();
-        assert!(synthesis.next_row(&mut [0.0; 10]).is_err());
-        model.levels[1].gamma *= 3.0;
-        assert!(Synthesis::new(&model, 1, 5, 5).is_err());
-    }
-}
+mod tests;

@@ -15,6 +15,9 @@ use crate::error::{Error, Result};
 /// Factor by which a field that no neighbourhood makes stable is damped, again and again.
 const DAMPING: f64 = 0.95;
 
+/// A model of more levels is taken if it has less than this share of the error.
+const WORTH_A_LEVEL: f64 = 0.98;
+
 /// Fits a model to a field of any number of channels.
 ///
 /// Where the number of levels is left open, it is the one whose synthesis has the least error of autocovariance. Band
@@ -47,7 +50,7 @@ pub fn fit(field: &Field, options: &Options) -> Result<Model> {
     let Choice { levels, covariance, autocovariance_error } = choices
         .reduce(|best, next| {
             let (best, next) = (best?, next?);
-            Ok(if next.autocovariance_error < best.autocovariance_error { next } else { best })
+            Ok(if next.autocovariance_error < WORTH_A_LEVEL * best.autocovariance_error { next } else { best })
         })
         .ok_or_else(|| Error::internal("a pyramid of no levels"))??;
     let covariance = match &transform {

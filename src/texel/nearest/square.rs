@@ -21,38 +21,55 @@ const LEAST_Z_SQUARED: f64 = 1.0 / 64.0;
 
 const VERTICES: usize = 8;
 
+/// Most points that others are compared with, and how many at a time.
+const OTHERS: usize = 96;
+const STEP: usize = 32;
+
 /// A point and its number.
 pub(super) type Point = ([f32; 3], u32);
 
-/// A square of (x, y).
+/// A square of (x, y): by halvings of the one around the unit circle, and by column and row among its like.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Square {
-    pub x: f32,
-    pub y: f32,
-    pub side: f32,
+    pub level: u32,
+    pub column: u32,
+    pub row: u32,
 }
 
 impl Square {
+    /// The one around the unit circle.
+    pub(super) const WHOLE: Self = Self { level: 0, column: 0, row: 0 };
+
+    /// The parts at the lower left, lower right, upper left and upper right, by x and y.
     pub(super) fn quarters(self) -> [Self; 4] {
-        let side = self.side / 2.0;
-        [(0.0, 0.0), (side, 0.0), (0.0, side), (side, side)].map(|(x, y)| Self {
-            x: self.x + x,
-            y: self.y + y,
-            side,
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, up)| Self {
+            level: self.level + 1,
+            column: 2 * self.column + right,
+            row: 2 * self.row + up,
         })
+    }
+
+    fn side(self) -> f64 {
+        2.0 / f64::from(1 << self.level)
+    }
+
+    /// Least x and y.
+    fn corner(self) -> [f64; 2] {
+        [self.column, self.row].map(|place| f64::from(place) * self.side() - 1.0)
     }
 
     /// Whether no unit vector with z >= 0 lies over the square.
     pub(super) fn is_outside(self) -> bool {
-        let nearest = |from: f32| f64::from(0.0f32.clamp(from - SLACK, from + self.side + SLACK));
-        nearest(self.x).powi(2) + nearest(self.y).powi(2) > 1.0
+        let slack = f64::from(SLACK);
+        let nearest = self.corner().map(|from| 0.0f64.clamp(from - slack, from + self.side() + slack));
+        nearest[0] * nearest[0] + nearest[1] * nearest[1] > 1.0
     }
 
     /// The patch over the square, unless a corner is too near the rim of the sphere.
     pub(super) fn patch(self) -> Option<Patch> {
-        let middle = [self.x, self.y].map(|from| f64::from(from) + f64::from(self.side) / 2.0);
+        let middle = self.corner().map(|from| from + self.side() / 2.0);
         let height = (1.0 - middle[0] * middle[0] - middle[1] * middle[1]).sqrt();
-        let half = f64::from(self.side) / 2.0 + f64::from(SLACK);
+        let half = self.side() / 2.0 + f64::from(SLACK);
         let mut vertices = [[0.0; 3]; VERTICES];
         let corners = [(-half, -half), (half, -half), (-half, half), (half, half)];
         for (corner, (dx, dy)) in corners.into_iter().enumerate() {
@@ -89,19 +106,18 @@ impl Patch {
         (squared.sqrt() + 2.0 * self.radius).powi(2) * f64::from(SURPLUS)
     }
 
-    /// All normals that a query can have among its `count` nearest, and some more, by number, with the distance of
-    /// the last neighbour of the middle; none if there are not enough.
+    /// All normals that a query can have among its `count` nearest, and some more, with the distance of the last
+    /// neighbour of the middle; none if there are not enough.
     pub(super) fn of_tree(&self, tree: &Tree, count: usize) -> Option<(Vec<Point>, f64)> {
         let mut nearest = vec![Neighbour::NONE; count];
         tree.find(self.middle, &mut nearest);
         let last = nearest.last()?.distance;
         let mut points = Vec::new();
         tree.within(self.middle, self.reach(last), &mut points);
-        points.sort_unstable_by_key(|&(_, number)| number);
         last.is_finite().then_some((points, last.sqrt()))
     }
 
-    /// The same of points, in the order of their numbers, among which they are known to be.
+    /// The same of points among which they are known to be; there must be as many as are wanted.
     pub(super) fn of_points(&self, points: &[Point], count: usize) -> Option<(Vec<Point>, f64)> {
         let distances: Vec<f64> = points.iter().map(|&(at, _)| squared_distance(at, self.middle)).collect();
         let mut sorted = distances.clone();
@@ -111,39 +127,75 @@ impl Patch {
         Some((near.map(|(&point, _)| point).collect(), last.sqrt()))
     }
 
-    /// Leaves out points that at least `count` others precede for every query.
-    pub(super) fn without_preceded(&self, points: &mut Vec<Point>, count: usize, kernel: Kernel) {
-        let distances: Vec<Vec<f32>> = self
-            .vertices
-            .iter()
-            .map(|vertex| {
-                let to = |&(at, _): &Point| {
-                    let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - vertex[axis]);
-                    x * x + y * y + z * z
-                };
-                points.iter().map(to).collect()
-            })
-            .collect();
-        let mut place = 0;
-        points.retain(|_| {
-            let own: [f32; VERTICES] = std::array::from_fn(|vertex| distances[vertex][place] / SURPLUS);
-            place += 1;
-            let all: [&[f32]; VERTICES] = std::array::from_fn(|vertex| &distances[vertex][..]);
-            (count_preceding(kernel, &all, &own) as usize) < count
-        });
+    /// Drops points that at least `count` others precede for every query. Only those nearest to the middle are looked
+    /// at for others.
+    pub(super) fn drop_preceded(&self, points: &mut Vec<Point>, count: usize, kernel: Kernel) {
+        let mut others: Vec<Point> = points.clone();
+        let distance = |&(at, _): &Point| squared_distance(at, self.middle);
+        for nearest in [OTHERS, STEP] {
+            if others.len() > nearest {
+                others.select_nth_unstable_by(nearest, |a, b| distance(a).total_cmp(&distance(b)));
+                others.truncate(OTHERS);
+            }
+        }
+        let mut distances = [[[f32::INFINITY; STEP]; VERTICES]; OTHERS / STEP];
+        for (distances, others) in distances.iter_mut().zip(others.chunks(STEP)) {
+            for (distances, &vertex) in distances.iter_mut().zip(&self.vertices) {
+                for (distance, &(at, _)) in distances.iter_mut().zip(others) {
+                    *distance = SURPLUS * short_distance(vertex, at);
+                }
+            }
+        }
+        keep_unpreceded(kernel, &self.vertices, &distances, count as u32, points);
     }
 }
 
+/// Squared distance in f32.
+#[inline]
+fn short_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let [x, y, z] = [0, 1, 2].map(|axis| a[axis] - b[axis]);
+    x * x + y * y + z * z
+}
+
 compiled_for_each_kernel! {
-    /// How many points are nearer than `own` to every vertex; `distances` are those of each vertex to all points.
-    fn count_preceding(distances: &[&[f32]; VERTICES], own: &[f32; VERTICES]) -> u32 = count_preceding_body
+    /// Keeps the points for which fewer than `count` of the others are nearer to every vertex.
+    fn keep_unpreceded(
+        vertices: &[[f32; 3]; VERTICES],
+        distances: &[[[f32; STEP]; VERTICES]],
+        count: u32,
+        points: &mut Vec<Point>,
+    ) = keep_unpreceded_body
 }
 
 #[inline(always)]
-fn count_preceding_body(distances: &[&[f32]; VERTICES], own: &[f32; VERTICES]) -> u32 {
-    let count = distances[0].len();
-    let distances = distances.map(|distances| &distances[..count]);
-    let nearer =
-        |point: usize| (0..VERTICES).fold(true, |all, vertex| all & (distances[vertex][point] < own[vertex]));
-    (0..count).map(|point| u32::from(nearer(point))).sum()
+fn keep_unpreceded_body(
+    vertices: &[[f32; 3]; VERTICES],
+    distances: &[[[f32; STEP]; VERTICES]],
+    count: u32,
+    points: &mut Vec<Point>,
+) {
+    let mut kept = 0;
+    // Loops, since closures handed to a library would be compiled for the target alone.
+    for place in 0..points.len() {
+        let (at, _) = points[place];
+        let own = vertices.map(|vertex| short_distance(vertex, at));
+        let mut found = 0;
+        for distances in distances {
+            let mut precedes = [1; STEP];
+            for (distances, own) in distances.iter().zip(own) {
+                for (precedes, &distance) in precedes.iter_mut().zip(distances) {
+                    *precedes &= u32::from(distance < own);
+                }
+            }
+            found += precedes.iter().sum::<u32>();
+            if found >= count {
+                break;
+            }
+        }
+        if found < count {
+            points[kept] = points[place];
+            kept += 1;
+        }
+    }
+    points.truncate(kept);
 }

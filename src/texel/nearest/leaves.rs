@@ -63,7 +63,8 @@ impl Leaves {
         cut(Square::WHOLE, &held, &mut squares);
         squares.sort_by_key(|&(held, square)| (Reverse(held), square.level));
         for squares in squares.chunks(TOGETHER) {
-            let nodes: Vec<Node> = squares.par_iter().map(|&(_, square)| search.refine(square)).collect();
+            let nodes: Vec<Node> =
+                squares.par_iter().map(|&(_, square)| search.refine(square, None)).collect();
             for (&(_, square), node) in squares.iter().zip(&nodes) {
                 leaves.add(square, node);
             }

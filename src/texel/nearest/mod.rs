@@ -32,7 +32,7 @@ impl NearestNormals {
         let tree = Tree::new(points.clone());
         let leaves = (1..=RANKS)
             .contains(&count)
-            .then(|| Leaves::new(&points, &Search { tree: &tree, count, kernel }));
+            .then(|| Leaves::new(&points, &Search { normals, tree: &tree, count, kernel }));
         Self { tree, leaves, count, kernel }
     }
 

@@ -6,7 +6,7 @@
 //! a convex function, greatest over the hull at a vertex; and whether a query is nearer to one point than to another
 //! is a linear one (the bisecting plane), true in the hull when it is true at each vertex.
 
-use super::tree::{Neighbour, Tree, squared_distance};
+use super::tree::nearest_of_box;
 use crate::kernel::Kernel;
 use crate::kernel::compiled_for_each_kernel;
 
@@ -22,8 +22,8 @@ const LEAST_Z_SQUARED: f64 = 1.0 / 64.0;
 const VERTICES: usize = 8;
 
 /// Most points that others are compared with, and how many at a time.
-const OTHERS: usize = 96;
-const STEP: usize = 32;
+pub(super) const RIVALS: usize = 96;
+pub(super) const STEP: usize = 32;
 
 /// A point and its number.
 pub(super) type Point = ([f32; 3], u32);
@@ -85,117 +85,76 @@ impl Square {
         }
         let middle = [middle[0], middle[1], height].map(|v| v as f32);
         let radius =
-            vertices.iter().map(|&vertex| squared_distance(vertex, middle).sqrt()).fold(0.0, f64::max);
+            vertices.iter().map(|&vertex| squared_distance(vertex, middle)).fold(0.0, f32::max).sqrt();
         Some(Patch { middle, radius, vertices })
     }
 }
 
 /// What queries over a square can be.
 pub(super) struct Patch {
-    middle: [f32; 3],
+    pub middle: [f32; 3],
     /// Greatest distance of a query from the middle.
-    pub radius: f64,
+    pub radius: f32,
     vertices: [[f32; 3]; VERTICES],
 }
 
 impl Patch {
-    /// Squared distance from the middle within which the `count` nearest of all queries lie, when the last of those
-    /// of the middle is this far: a query lies at most a radius off, so it has as many neighbours no farther than
-    /// that and a radius, and those lie no farther from the middle than a radius more.
-    fn reach(&self, squared: f64) -> f64 {
-        (squared.sqrt() + 2.0 * self.radius).powi(2) * f64::from(SURPLUS)
-    }
-
-    /// All normals that a query can have among its `count` nearest, and some more, with the distance of the last
-    /// neighbour of the middle; none if there are not enough.
-    pub(super) fn of_tree(&self, tree: &Tree, count: usize) -> Option<(Vec<Point>, f64)> {
-        let mut nearest = vec![Neighbour::NONE; count];
-        tree.find(self.middle, &mut nearest);
-        let last = nearest.last()?.distance;
-        let mut points = Vec::new();
-        tree.within(self.middle, self.reach(last), &mut points);
-        last.is_finite().then_some((points, last.sqrt()))
-    }
-
-    /// The same of points among which they are known to be; there must be as many as are wanted.
-    pub(super) fn of_points(&self, points: &[Point], count: usize) -> Option<(Vec<Point>, f64)> {
-        let distances: Vec<f64> = points.iter().map(|&(at, _)| squared_distance(at, self.middle)).collect();
-        let mut sorted = distances.clone();
-        let last = *sorted.select_nth_unstable_by(count - 1, f64::total_cmp).1;
-        let reach = self.reach(last);
-        let near = points.iter().zip(distances).filter(|(_, distance)| *distance <= reach);
-        Some((near.map(|(&point, _)| point).collect(), last.sqrt()))
-    }
-
-    /// Drops points that at least `count` others precede for every query. Only those nearest to the middle are looked
-    /// at for others.
-    pub(super) fn drop_preceded(&self, points: &mut Vec<Point>, count: usize, kernel: Kernel) {
-        let mut others: Vec<Point> = points.clone();
-        let distance = |&(at, _): &Point| squared_distance(at, self.middle);
-        for nearest in [OTHERS, STEP] {
-            if others.len() > nearest {
-                others.select_nth_unstable_by(nearest, |a, b| distance(a).total_cmp(&distance(b)));
-                others.truncate(OTHERS);
+    /// Points to compare others with: those near the middle rule out most, the first of them the most. What exceeds
+    /// [`RIVALS`] is not looked at.
+    pub(super) fn rivals(&self, nearest: impl Iterator<Item = [f32; 3]>) -> Rivals {
+        let mut distances = [[[f32::INFINITY; STEP]; VERTICES]; RIVALS / STEP];
+        for (place, rival) in nearest.take(RIVALS).enumerate() {
+            for (distances, &vertex) in distances[place / STEP].iter_mut().zip(&self.vertices) {
+                distances[place % STEP] = SURPLUS * squared_distance(vertex, rival);
             }
         }
-        let mut distances = [[[f32::INFINITY; STEP]; VERTICES]; OTHERS / STEP];
-        for (distances, others) in distances.iter_mut().zip(others.chunks(STEP)) {
-            for (distances, &vertex) in distances.iter_mut().zip(&self.vertices) {
-                for (distance, &(at, _)) in distances.iter_mut().zip(others) {
-                    *distance = SURPLUS * short_distance(vertex, at);
-                }
-            }
-        }
-        keep_unpreceded(kernel, &self.vertices, &distances, count as u32, points);
+        Rivals { vertices: self.vertices, distances }
+    }
+}
+
+/// Points that may precede others for every query of a patch.
+pub(super) struct Rivals {
+    vertices: [[f32; 3]; VERTICES],
+    /// Squared distances from the vertices, rounded up.
+    distances: [[[f32; STEP]; VERTICES]; RIVALS / STEP],
+}
+
+impl Rivals {
+    /// Whether at least `count` of them precede all points of a box, for every query.
+    #[inline]
+    pub(super) fn precede(&self, kernel: Kernel, low: [f32; 3], high: [f32; 3], count: usize) -> bool {
+        let own = self.vertices.map(|vertex| squared_distance(vertex, nearest_of_box(vertex, low, high)));
+        precede(kernel, &self.distances, &own, count as u32)
     }
 }
 
 /// Squared distance in f32.
 #[inline]
-fn short_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|axis| a[axis] - b[axis]);
     x * x + y * y + z * z
 }
 
 compiled_for_each_kernel! {
-    /// Keeps the points for which fewer than `count` of the others are nearer to every vertex.
-    fn keep_unpreceded(
-        vertices: &[[f32; 3]; VERTICES],
-        distances: &[[[f32; STEP]; VERTICES]],
-        count: u32,
-        points: &mut Vec<Point>,
-    ) = keep_unpreceded_body
+    /// Whether at least `count` of the rivals are nearer to every vertex than it is to its `own`.
+    fn precede(distances: &[[[f32; STEP]; VERTICES]], own: &[f32; VERTICES], count: u32) -> bool = precede_body
 }
 
 #[inline(always)]
-fn keep_unpreceded_body(
-    vertices: &[[f32; 3]; VERTICES],
-    distances: &[[[f32; STEP]; VERTICES]],
-    count: u32,
-    points: &mut Vec<Point>,
-) {
-    let mut kept = 0;
-    // Loops, since closures handed to a library would be compiled for the target alone.
-    for place in 0..points.len() {
-        let (at, _) = points[place];
-        let own = vertices.map(|vertex| short_distance(vertex, at));
-        let mut found = 0;
-        for distances in distances {
-            let mut precedes = [1; STEP];
-            for (distances, own) in distances.iter().zip(own) {
-                for (precedes, &distance) in precedes.iter_mut().zip(distances) {
-                    *precedes &= u32::from(distance < own);
-                }
-            }
-            found += precedes.iter().sum::<u32>();
-            if found >= count {
-                break;
+fn precede_body(distances: &[[[f32; STEP]; VERTICES]], own: &[f32; VERTICES], count: u32) -> bool {
+    let mut found = 0;
+    for distances in distances {
+        let mut surplus = [f32::NEG_INFINITY; STEP];
+        for (distances, own) in distances.iter().zip(own) {
+            for (surplus, distance) in surplus.iter_mut().zip(distances) {
+                let here = distance - own;
+                *surplus = if here > *surplus { here } else { *surplus };
             }
         }
-        if found < count {
-            points[kept] = points[place];
-            kept += 1;
+        found += surplus.iter().map(|&surplus| surplus.to_bits() >> 31).sum::<u32>(); // counts minus signs
+        if found >= count {
+            return true;
         }
     }
-    points.truncate(kept);
+    false
 }

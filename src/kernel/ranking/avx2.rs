@@ -14,7 +14,6 @@ networks!("avx2", Register, _mm256_min_epu32, _mm256_max_epu32, _mm256_sub_epi32
 pub(super) fn rank(
     candidates: &[&Candidates; BATCH],
     queries: &[[f32; 3]; BATCH],
-    ranks: usize,
     found: &mut [[u32; RANKS]; BATCH],
 ) -> u32 {
     let halves = candidates
@@ -25,7 +24,7 @@ pub(super) fn rank(
         .zip(found.as_chunks_mut::<LANES>().0);
     let mut doubtful = 0;
     for (half, ((candidates, queries), found)) in halves.enumerate() {
-        doubtful |= rank_half(candidates, queries, ranks, found) << (half * LANES);
+        doubtful |= rank_half(candidates, queries, found) << (half * LANES);
     }
     doubtful
 }
@@ -35,7 +34,6 @@ pub(super) fn rank(
 fn rank_half(
     candidates: &[&Candidates; LANES],
     queries: &[[f32; 3]; LANES],
-    ranks: usize,
     found: &mut [[u32; RANKS]; LANES],
 ) -> u32 {
     // Keys of eight slots of each query.
@@ -45,7 +43,7 @@ fn rank_half(
     let run = |n: usize| -> [Register; RANKS] {
         std::array::from_fn(|slot| octets[2 * n + slot / LANES][slot % LANES])
     };
-    let (least, gap) = least([run(0), run(1), run(2)], ranks);
+    let (least, gap) = least([run(0), run(1), run(2)]);
     let halves = least.as_chunks::<LANES>().0;
     for (half, ranks) in halves.iter().enumerate() {
         for ((keys, candidates), found) in transpose(*ranks).into_iter().zip(candidates).zip(&mut *found) {

@@ -15,7 +15,6 @@ networks!("avx512f,avx512bw,avx512vl", Register, _mm512_min_epu32, _mm512_max_ep
 pub(super) fn rank(
     candidates: &[&Candidates; BATCH],
     queries: &[[f32; 3]; BATCH],
-    ranks: usize,
     found: &mut [[u32; RANKS]; BATCH],
 ) -> u32 {
     let mut runs = [[_mm512_setzero_si512(); BATCH]; RUNS];
@@ -24,7 +23,7 @@ pub(super) fn rank(
             runs[run][query] = keys;
         }
     }
-    let (least, gap) = least(runs.map(|run| transpose(run)), ranks);
+    let (least, gap) = least(runs.map(|run| transpose(run)));
     for ((keys, candidates), found) in transpose(least).into_iter().zip(candidates).zip(found) {
         numbers(candidates, keys, found);
     }

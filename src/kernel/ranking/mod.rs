@@ -25,7 +25,7 @@ mod avx512;
 /// Most candidates.
 pub const CAPACITY: usize = 48;
 
-/// Most ranks that are found.
+/// Ranks that are found.
 pub const RANKS: usize = 16;
 
 /// Queries ranked at a time.
@@ -39,7 +39,8 @@ const SLOT_BITS: u32 = CAPACITY.next_power_of_two().ilog2();
 #[cfg(target_arch = "x86_64")]
 const DOUBTFUL: i32 = 2 << SLOT_BITS;
 
-/// Candidates in the order of their numbers, component by component; slots behind them lie at infinity.
+/// Candidates in the order of their numbers, component by component. Slots behind them lie far away, no two equally
+/// far, so that their order is not in doubt.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct Candidates {
@@ -50,17 +51,14 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// No candidates.
-    pub const NONE: Self = Self {
-        x: [f32::INFINITY; CAPACITY],
-        y: [f32::INFINITY; CAPACITY],
-        z: [f32::INFINITY; CAPACITY],
-        number: [u32::MAX; CAPACITY],
-    };
-
     /// From points and their numbers, which must ascend. Points that exceed the capacity are left out.
     pub fn new(points: impl IntoIterator<Item = ([f32; 3], u32)>) -> Self {
-        let mut candidates = Self::NONE;
+        let mut candidates = Self {
+            x: std::array::from_fn(|slot| 2.0f32.powi(slot as i32 + 8)),
+            y: [0.0; CAPACITY],
+            z: [0.0; CAPACITY],
+            number: [u32::MAX; CAPACITY],
+        };
         for (slot, (point, number)) in points.into_iter().take(CAPACITY).enumerate() {
             [candidates.x[slot], candidates.y[slot], candidates.z[slot]] = point;
             candidates.number[slot] = number;
@@ -92,7 +90,7 @@ impl Candidates {
     }
 
     /// The nearest to one query by squared distance in f64, summed x, y, z; ties by number.
-    fn rank(&self, query: [f32; 3], found: &mut [u32]) {
+    fn rank(&self, query: [f32; 3], found: &mut [u32; RANKS]) {
         let query = query.map(f64::from);
         let mut distances = [0.0; CAPACITY];
         for (slot, distance) in distances.iter_mut().enumerate() {
@@ -101,54 +99,46 @@ impl Candidates {
             let z = query[2] - f64::from(self.z[slot]);
             *distance = x * x + y * y + z * z;
         }
-        let mut nearest = [(f64::INFINITY, u32::MAX); RANKS];
-        let nearest = &mut nearest[..found.len()];
-        let last = nearest.len() - 1;
+        let mut nearest = [f64::INFINITY; RANKS];
         // Numbers ascend, so that of equal distances the one that comes first stays before the other.
         for (&distance, &number) in distances.iter().zip(&self.number) {
-            if distance < nearest[last].0 {
-                let mut place = last;
-                while place > 0 && distance < nearest[place - 1].0 {
+            if distance < nearest[RANKS - 1] {
+                let mut place = RANKS - 1;
+                while place > 0 && distance < nearest[place - 1] {
                     nearest[place] = nearest[place - 1];
+                    found[place] = found[place - 1];
                     place -= 1;
                 }
-                nearest[place] = (distance, number);
+                nearest[place] = distance;
+                found[place] = number;
             }
-        }
-        for (found, &(_, number)) in found.iter_mut().zip(nearest.iter()) {
-            *found = number;
         }
     }
 }
 
 impl Kernel {
-    /// For each query the numbers of its nearest candidates, nearest first: `found` is [query, rank] with as many
-    /// ranks, 1 to [`RANKS`], as its length gives. Queries must be finite, and each must have at least as many
-    /// candidates as ranks are asked for; what is found otherwise means nothing.
-    pub fn rank(self, candidates: &[&Candidates; BATCH], queries: &[[f32; 3]; BATCH], found: &mut [u32]) {
-        let ranks = (found.len() / BATCH).clamp(1, RANKS);
-        #[cfg(target_arch = "x86_64")]
-        {
-            let mut all = [[0; RANKS]; BATCH];
-            #[allow(unsafe_code)]
-            let doubtful = match self {
-                Self::Plain => u32::MAX,
-                // SAFETY: a kernel is only ever constructed after its features were found.
-                Self::Avx2 => unsafe { avx2::rank(candidates, queries, ranks, &mut all) },
-                // SAFETY: as above.
-                Self::Avx512 => unsafe { avx512::rank(candidates, queries, ranks, &mut all) },
-            };
-            for (query, found) in found.chunks_exact_mut(ranks).enumerate() {
-                if doubtful >> query & 1 == 1 {
-                    candidates[query].rank(queries[query], found);
-                } else {
-                    found.copy_from_slice(&all[query][..ranks]);
-                }
-            }
-        }
-        #[cfg(not(target_arch = "x86_64"))]
-        for (query, found) in found.chunks_exact_mut(ranks).enumerate() {
-            candidates[query].rank(queries[query], found);
+    /// For each query the numbers of its nearest candidates, nearest first. Queries must be finite; ranks beyond the
+    /// number of a query's candidates mean nothing.
+    pub fn rank(
+        self,
+        candidates: &[&Candidates; BATCH],
+        queries: &[[f32; 3]; BATCH],
+        found: &mut [[u32; RANKS]; BATCH],
+    ) {
+        #[allow(unsafe_code)]
+        let mut doubtful = match self {
+            Self::Plain => (1 << BATCH) - 1,
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a kernel is only ever constructed after its features were found.
+            Self::Avx2 => unsafe { avx2::rank(candidates, queries, found) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above.
+            Self::Avx512 => unsafe { avx512::rank(candidates, queries, found) },
+        };
+        while doubtful != 0 {
+            let query = doubtful.trailing_zeros() as usize;
+            candidates[query].rank(queries[query], &mut found[query]);
+            doubtful &= doubtful - 1;
         }
     }
 }

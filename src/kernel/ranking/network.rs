@@ -34,38 +34,33 @@ macro_rules! networks {
         #[target_feature(enable = $features)]
         #[inline]
         fn lower_half(a: &[$register; RANKS], b: &[$register; RANKS]) -> ([$register; RANKS], $register) {
-            // One run backwards after the other rises and falls once: of such a run, minima and maxima of its halves
-            // are again two, none of the first above any of the second.
+            // One run backwards after the other rises and falls once: of such a run, the minima and maxima of its
+            // halves are again two, none of the first above any of the second.
             let mut keys = *a;
             let mut next = $max(a[0], b[RANKS - 1]);
             for rank in 0..RANKS {
                 keys[rank] = $min(a[rank], b[RANKS - 1 - rank]);
                 next = $min(next, $max(a[rank], b[RANKS - 1 - rank]));
             }
-            for half in [8, 4, 2, 1] {
-                for first in 0..RANKS {
-                    if first & half == 0 {
-                        let (a, b) = (keys[first], keys[first + half]);
-                        (keys[first], keys[first + half]) = ($min(a, b), $max(a, b));
-                    }
-                }
+            compare! { keys, $min, $max:
+                (0, 8) (1, 9) (2, 10) (3, 11) (4, 12) (5, 13) (6, 14) (7, 15)
+                (0, 4) (1, 5) (2, 6) (3, 7) (8, 12) (9, 13) (10, 14) (11, 15)
+                (0, 2) (1, 3) (4, 6) (5, 7) (8, 10) (9, 11) (12, 14) (13, 15)
+                (0, 1) (2, 3) (4, 5) (6, 7) (8, 9) (10, 11) (12, 13) (14, 15)
             }
             (keys, next)
         }
 
         /// The least keys of three unsorted runs, in order, and the least difference of keys that follow each other
-        /// among the first `ranks` and the one after them.
+        /// among them and the next one.
         #[target_feature(enable = $features)]
         #[inline]
-        fn least(runs: [[$register; RANKS]; 3], ranks: usize) -> ([$register; RANKS], $register) {
+        fn least(runs: [[$register; RANKS]; 3]) -> ([$register; RANKS], $register) {
             let [a, b, c] = runs;
             let (ab, next_ab) = lower_half(&sort(a), &sort(b));
             let (keys, next) = lower_half(&ab, &sort(c));
             let mut gap = $sub($min(next, next_ab), keys[RANKS - 1]);
-            if ranks < RANKS {
-                gap = $sub(keys[ranks], keys[ranks - 1]);
-            }
-            for rank in 1..ranks {
+            for rank in 1..RANKS {
                 gap = $min(gap, $sub(keys[rank], keys[rank - 1]));
             }
             (keys, gap)

@@ -5,40 +5,35 @@
 //! as fine as the densest normals in it call for. Squares of the table that need not be so fine share their
 //! candidates.
 
+use std::cmp::Reverse;
+
 use rayon::prelude::*;
 
+use super::search::{Node, Search};
 use super::square::{Point, SLACK, Square};
-use super::tree::Tree;
-use crate::kernel::Kernel;
-use crate::kernel::ranking::{CAPACITY, Candidates};
+use crate::kernel::ranking::{BATCH, Candidates};
+
+/// Halvings of the whole square that make the grid.
+const GRID_LEVEL: u32 = 6;
 
 /// Cells on a side.
-const GRID: usize = 64;
+const GRID: usize = 1 << GRID_LEVEL;
 
-/// Most halvings of a cell's side.
-const DEEPEST: u32 = 8;
+/// Bits of a place: x or y from -1 to 1 in steps of 2^-22.
+const PLACE_BITS: u32 = 23;
 
-/// Most halvings near the rim, where patches cannot be bounded.
-const DEEPEST_AT_RIM: u32 = 3;
-
-/// Fewest candidates for whose sake it is too early to compare each with all others.
-const MANY: usize = 192;
-
-/// Least radius of a patch in distances of the last neighbour: where there are still too many candidates, they lie
-/// on each other.
-const LEAST_RADIUS: f64 = 1.0 / 16.0;
-
-/// Cells built at a time.
+/// Squares whose candidates are sought at a time.
 const TOGETHER: usize = 8;
 
-/// Most bytes of tables and candidates.
-const MOST_BYTES: usize = 32 << 20;
+/// Bytes of tables and candidates after which no more are made.
+const ENOUGH_BYTES: usize = 32 << 20;
 
 /// Tables and candidates.
 pub(super) struct Leaves {
     cells: Vec<Cell>,
-    /// Numbers in `candidates` by cell, row and column. Number 0 leads nowhere.
+    /// Numbers in `candidates` by cell, row and column. Entry 0 is 0.
     table: Vec<u32>,
+    /// Number 0 has none.
     candidates: Vec<Candidates>,
 }
 
@@ -49,49 +44,54 @@ struct Cell {
     depth: u32,
 }
 
-/// A square with its candidates, if they are few enough, or cut in four.
-enum Node {
-    Leaf(Option<Box<Candidates>>),
-    Quarters(Box<[Node; 4]>),
-}
-
 impl Leaves {
-    /// Over the points of a tree, for the `count` nearest. Cells come in the order of how many normals they hold:
-    /// queries will be where normals are, and what does not fit the memory is left to the tree.
-    pub(super) fn new(points: &[Point], tree: &Tree, count: usize, kernel: Kernel) -> Self {
+    /// Over the points of a search. Where most normals are most queries will be: that is begun with, and what does
+    /// not fit the memory is left to the tree.
+    pub(super) fn new(points: &[Point], search: &Search<'_>) -> Self {
         let mut leaves = Self {
             cells: vec![Cell::default(); GRID * GRID],
             table: vec![0],
-            candidates: vec![Candidates::NONE],
+            candidates: vec![Candidates::new([])],
         };
-        let mut held = vec![0usize; GRID * GRID];
-        for (normal, _) in points {
-            if let Some((cell, _)) = locate(*normal) {
-                held[cell] += 1;
+        let mut held = vec![0; GRID * GRID];
+        for &(normal, _) in points {
+            if let [Some(x), Some(y)] = place(normal) {
+                held[cell(x, y)] += 1;
             }
         }
-        let mut order: Vec<usize> = (0..GRID * GRID).filter(|&cell| !square(cell).is_outside()).collect();
-        order.sort_by_key(|&cell| std::cmp::Reverse(held[cell]));
-        let search = Search { tree, count, kernel };
-        for cells in order.chunks(TOGETHER) {
+        let mut squares = Vec::new();
+        cut(Square::WHOLE, &held, &mut squares);
+        squares.sort_by_key(|&(held, square)| (Reverse(held), square.level));
+        for squares in squares.chunks(TOGETHER) {
             let nodes: Vec<Node> =
-                cells.par_iter().map(|&cell| search.refine(square(cell), None, 0)).collect();
-            for (&cell, node) in cells.iter().zip(&nodes) {
-                leaves.add(cell, node);
+                squares.par_iter().map(|&(_, square)| search.refine(square, None)).collect();
+            for (&(_, square), node) in squares.iter().zip(&nodes) {
+                leaves.add(square, node);
             }
-            if leaves.memory_bytes() > MOST_BYTES {
+            if leaves.memory_bytes() > ENOUGH_BYTES {
                 break;
             }
         }
         leaves
     }
 
-    fn add(&mut self, cell: usize, node: &Node) {
-        let depth = node.depth();
-        let start = self.table.len();
-        self.cells[cell] = Cell { start: start as u32, depth };
-        self.table.resize(start + (1 << (2 * depth)), 0);
-        self.fill(node, start, 1 << depth, 1 << depth);
+    /// Adds what was found for a square that is a cell or larger.
+    fn add(&mut self, square: Square, node: &Node) {
+        match node {
+            Node::Quarters(quarters) if square.level < GRID_LEVEL => {
+                for (square, node) in square.quarters().into_iter().zip(quarters.iter()) {
+                    self.add(square, node);
+                }
+            }
+            _ => {
+                let (start, depth) = (self.table.len(), node.depth());
+                self.table.resize(start + (1 << (2 * depth)), 0);
+                self.fill(node, start, 1 << depth, 1 << depth);
+                for cell in cells(square) {
+                    self.cells[cell] = Cell { start: start as u32, depth };
+                }
+            }
+        }
     }
 
     /// Fills a square of a table from its first entry on; `stride` leads to the next row.
@@ -115,22 +115,25 @@ impl Leaves {
         }
     }
 
-    /// The candidates for a query; none if it is not of unit length, has z <= 0 or lies where there is no table.
+    /// The candidates for each query; none if it is not of unit length, has z <= 0 or lies where there is no table.
     #[inline]
-    pub(super) fn find(&self, query: [f32; 3]) -> &Candidates {
-        let [x, y, z] = query;
-        // Of a unit vector with the same x and y, the query's z is off by at most this surplus over z. Half the slack
-        // is left for rounding.
-        let surplus = (x * x + y * y + z * z - 1.0).abs();
-        let entry = match locate(query) {
-            Some((cell, [column, row])) if surplus <= z * (0.5 * SLACK) => {
-                let Cell { start, depth } = self.cells[cell];
-                let side = (1 << depth) as f32;
-                start as usize + (((row * side) as usize) << depth) + (column * side) as usize
-            }
-            _ => 0,
-        };
-        &self.candidates[self.table[entry] as usize]
+    pub(super) fn find(&self, queries: &[[f32; 3]; BATCH]) -> [&Candidates; BATCH] {
+        queries.map(|query| {
+            let [x, y, z] = query;
+            // Of a unit vector with the same x and y, the query's z is off by at most this surplus over z. Half the
+            // slack is left for rounding.
+            let surplus = (x * x + y * y + z * z - 1.0).abs();
+            let entry = match place(query) {
+                [Some(x), Some(y)] if surplus <= z * (0.5 * SLACK) => {
+                    let Cell { start, depth } = self.cells[cell(x, y)];
+                    let within =
+                        |place: u32| (place << GRID_LEVEL & ((1 << PLACE_BITS) - 1)) >> (PLACE_BITS - depth);
+                    start + (within(y) << depth) + within(x)
+                }
+                _ => 0,
+            };
+            &self.candidates[self.table[entry as usize] as usize]
+        })
     }
 
     /// Bytes held.
@@ -139,67 +142,36 @@ impl Leaves {
     }
 }
 
-/// The cell of a vector and where in it, in 0..1 by x and y.
+/// Squares without normals, as large as may be, and cells with some, with how many they hold.
+fn cut(square: Square, held: &[usize], squares: &mut Vec<(usize, Square)>) {
+    let sum = cells(square).map(|cell| held[cell]).sum();
+    if square.level < GRID_LEVEL && sum > 0 {
+        square.quarters().map(|quarter| cut(quarter, held, squares));
+    } else if !square.is_outside() {
+        squares.push((sum, square));
+    }
+}
+
+/// The cells of a square that is no smaller than one.
+fn cells(square: Square) -> impl Iterator<Item = usize> {
+    let side = GRID >> square.level;
+    let (column, row) = (square.column as usize * side, square.row as usize * side);
+    (row..row + side).flat_map(move |row| (column..column + side).map(move |column| row * GRID + column))
+}
+
+/// Places of x and y, if they lie in -1..1. Rounds by at most 2^-23.
 #[inline]
-fn locate([x, y, _]: [f32; 3]) -> Option<(usize, [f32; 2])> {
-    let [x, y] = [x, y].map(|component| (component + 1.0) * (GRID / 2) as f32);
-    let inside = |place: f32| (0.0..GRID as f32).contains(&place);
-    let (column, row) = (x as usize, y as usize);
-    (inside(x) && inside(y)).then(|| (row * GRID + column, [x - column as f32, y - row as f32]))
+fn place([x, y, _]: [f32; 3]) -> [Option<u32>; 2] {
+    // Numbers from 2 to 4 have one exponent: their bits count steps.
+    [x, y].map(|component| {
+        let place = (component + 3.0).to_bits().wrapping_sub(2.0f32.to_bits());
+        (place < 1 << PLACE_BITS).then_some(place)
+    })
 }
 
-fn square(cell: usize) -> Square {
-    let side = 2.0 / GRID as f32;
-    let [x, y] = [cell % GRID, cell / GRID].map(|place| place as f32 * side - 1.0);
-    Square { x, y, side }
-}
-
-/// What is needed to find candidates.
-struct Search<'a> {
-    tree: &'a Tree,
-    count: usize,
-    kernel: Kernel,
-}
-
-impl Search<'_> {
-    /// Cuts a square until candidates are few; `among` are points that hold them all, if such are known.
-    fn refine(&self, square: Square, among: Option<&[Point]>, depth: u32) -> Node {
-        let Some(patch) = square.patch() else {
-            return if depth < DEEPEST_AT_RIM && !square.is_outside() {
-                self.cut(square, None, depth)
-            } else {
-                Node::Leaf(None)
-            };
-        };
-        let Some((mut points, last)) = (match among {
-            None => patch.of_tree(self.tree, self.count),
-            Some(points) => patch.of_points(points, self.count),
-        }) else {
-            return Node::Leaf(None);
-        };
-        if points.len() <= MANY {
-            patch.without_preceded(&mut points, self.count, self.kernel);
-        }
-        if points.len() <= CAPACITY {
-            Node::Leaf(Some(Box::new(Candidates::new(points))))
-        } else if depth < DEEPEST && patch.radius > LEAST_RADIUS * last {
-            self.cut(square, Some(&points), depth)
-        } else {
-            Node::Leaf(None)
-        }
-    }
-
-    fn cut(&self, square: Square, among: Option<&[Point]>, depth: u32) -> Node {
-        Node::Quarters(Box::new(square.quarters().map(|quarter| self.refine(quarter, among, depth + 1))))
-    }
-}
-
-impl Node {
-    /// Most halvings.
-    fn depth(&self) -> u32 {
-        match self {
-            Self::Leaf(_) => 0,
-            Self::Quarters(quarters) => 1 + quarters.iter().map(Self::depth).max().unwrap_or(0),
-        }
-    }
+/// The cell of two places.
+#[inline]
+fn cell(x: u32, y: u32) -> usize {
+    let [column, row] = [x, y].map(|place| (place >> (PLACE_BITS - GRID_LEVEL)) as usize);
+    row * GRID + column
 }

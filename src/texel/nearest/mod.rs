@@ -5,13 +5,15 @@
 //! candidates would be too many, go to a k-d tree.
 
 mod leaves;
+mod search;
 mod square;
 pub mod tree;
 
 use self::leaves::Leaves;
+use self::search::Search;
 use self::tree::{Neighbour, Tree};
 use crate::kernel::Kernel;
-use crate::kernel::ranking::{BATCH, Candidates, RANKS};
+use crate::kernel::ranking::{BATCH, RANKS};
 
 /// Normals of a tile, ready to be searched.
 pub struct NearestNormals {
@@ -28,33 +30,39 @@ impl NearestNormals {
     pub fn new(normals: &[[f32; 3]], count: usize, kernel: Kernel) -> Self {
         let points = distinct(normals, count);
         let tree = Tree::new(points.clone());
-        let leaves = (1..=RANKS).contains(&count).then(|| Leaves::new(&points, &tree, count, kernel));
+        let leaves = (1..=RANKS)
+            .contains(&count)
+            .then(|| Leaves::new(&points, &Search { normals, tree: &tree, count, kernel }));
         Self { tree, leaves, count, kernel }
     }
 
     /// Finds the nearest normals of each query: `found` is [query, rank], texel numbers, nearest first. There must be
     /// as many normals as ranks.
     pub fn find_row(&self, queries: &[[f32; 3]], found: &mut [u32]) {
-        let Some(leaves) = &self.leaves else {
+        let (batches, rest) = queries.as_chunks::<BATCH>();
+        let Some(leaves) = self.leaves.as_ref().filter(|_| !batches.is_empty()) else {
             return self.find_by_tree(queries, found);
         };
-        let (batches, rest) = queries.as_chunks::<BATCH>();
         let (found, found_rest) = found.split_at_mut(batches.len() * BATCH * self.count);
-        let look_up = |batch: &[[f32; 3]; BATCH]| {
-            batch.map(|query| {
-                let candidates = leaves.find(query);
-                candidates.prefetch();
-                candidates
-            })
-        };
-        // Candidates are asked for a batch ahead.
-        let mut ahead = batches.first().map(look_up);
+        let mut ranked = [[0; RANKS]; BATCH];
+        let mut ahead = leaves.find(&batches[0]);
         for (number, (batch, found)) in
             batches.iter().zip(found.chunks_exact_mut(BATCH * self.count)).enumerate()
         {
-            let candidates = ahead.unwrap_or([&Candidates::NONE; BATCH]);
-            ahead = batches.get(number + 1).map(look_up);
-            self.kernel.rank(&candidates, batch, found);
+            let candidates = ahead;
+            // What the next batch needs comes from memory while this one is ranked.
+            if let Some(next) = batches.get(number + 1) {
+                ahead = leaves.find(next);
+                ahead.iter().for_each(|candidates| candidates.prefetch());
+            }
+            self.kernel.rank(&candidates, batch, &mut ranked);
+            if self.count == RANKS {
+                found.copy_from_slice(ranked.as_flattened());
+            } else {
+                for (found, ranked) in found.chunks_exact_mut(self.count).zip(&ranked) {
+                    found.copy_from_slice(&ranked[..self.count]);
+                }
+            }
             for (place, candidates) in candidates.iter().enumerate() {
                 if candidates.is_empty() {
                     let found = &mut found[place * self.count..][..self.count];
@@ -77,7 +85,7 @@ impl NearestNormals {
 
     /// How many candidates are ranked for a query; none if it goes to the tree.
     pub fn candidates(&self, query: [f32; 3]) -> Option<usize> {
-        let candidates = self.leaves.as_ref()?.find(query).len();
+        let candidates = self.leaves.as_ref()?.find(&[query; BATCH])[0].len();
         (candidates > 0).then_some(candidates)
     }
 

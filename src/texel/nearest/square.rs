@@ -6,7 +6,7 @@
 //! a convex function, greatest over the hull at a vertex; and whether a query is nearer to one point than to another
 //! is a linear one (the bisecting plane), true in the hull when it is true at each vertex.
 
-use super::tree::{Neighbour, Tree, squared_distance};
+use super::tree::nearest_of_box;
 use crate::kernel::Kernel;
 use crate::kernel::compiled_for_each_kernel;
 
@@ -21,38 +21,55 @@ const LEAST_Z_SQUARED: f64 = 1.0 / 64.0;
 
 const VERTICES: usize = 8;
 
+/// Most points that others are compared with, and how many at a time.
+pub(super) const RIVALS: usize = 96;
+pub(super) const STEP: usize = 32;
+
 /// A point and its number.
 pub(super) type Point = ([f32; 3], u32);
 
-/// A square of (x, y).
+/// A square of (x, y): by halvings of the one around the unit circle, and by column and row among its like.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Square {
-    pub x: f32,
-    pub y: f32,
-    pub side: f32,
+    pub level: u32,
+    pub column: u32,
+    pub row: u32,
 }
 
 impl Square {
+    /// The one around the unit circle.
+    pub(super) const WHOLE: Self = Self { level: 0, column: 0, row: 0 };
+
+    /// The parts at the lower left, lower right, upper left and upper right, by x and y.
     pub(super) fn quarters(self) -> [Self; 4] {
-        let side = self.side / 2.0;
-        [(0.0, 0.0), (side, 0.0), (0.0, side), (side, side)].map(|(x, y)| Self {
-            x: self.x + x,
-            y: self.y + y,
-            side,
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, up)| Self {
+            level: self.level + 1,
+            column: 2 * self.column + right,
+            row: 2 * self.row + up,
         })
+    }
+
+    fn side(self) -> f64 {
+        2.0 / f64::from(1 << self.level)
+    }
+
+    /// Least x and y.
+    fn corner(self) -> [f64; 2] {
+        [self.column, self.row].map(|place| f64::from(place) * self.side() - 1.0)
     }
 
     /// Whether no unit vector with z >= 0 lies over the square.
     pub(super) fn is_outside(self) -> bool {
-        let nearest = |from: f32| f64::from(0.0f32.clamp(from - SLACK, from + self.side + SLACK));
-        nearest(self.x).powi(2) + nearest(self.y).powi(2) > 1.0
+        let slack = f64::from(SLACK);
+        let nearest = self.corner().map(|from| 0.0f64.clamp(from - slack, from + self.side() + slack));
+        nearest[0] * nearest[0] + nearest[1] * nearest[1] > 1.0
     }
 
     /// The patch over the square, unless a corner is too near the rim of the sphere.
     pub(super) fn patch(self) -> Option<Patch> {
-        let middle = [self.x, self.y].map(|from| f64::from(from) + f64::from(self.side) / 2.0);
+        let middle = self.corner().map(|from| from + self.side() / 2.0);
         let height = (1.0 - middle[0] * middle[0] - middle[1] * middle[1]).sqrt();
-        let half = f64::from(self.side) / 2.0 + f64::from(SLACK);
+        let half = self.side() / 2.0 + f64::from(SLACK);
         let mut vertices = [[0.0; 3]; VERTICES];
         let corners = [(-half, -half), (half, -half), (-half, half), (half, half)];
         for (corner, (dx, dy)) in corners.into_iter().enumerate() {
@@ -68,82 +85,76 @@ impl Square {
         }
         let middle = [middle[0], middle[1], height].map(|v| v as f32);
         let radius =
-            vertices.iter().map(|&vertex| squared_distance(vertex, middle).sqrt()).fold(0.0, f64::max);
+            vertices.iter().map(|&vertex| squared_distance(vertex, middle)).fold(0.0, f32::max).sqrt();
         Some(Patch { middle, radius, vertices })
     }
 }
 
 /// What queries over a square can be.
 pub(super) struct Patch {
-    middle: [f32; 3],
+    pub middle: [f32; 3],
     /// Greatest distance of a query from the middle.
-    pub radius: f64,
+    pub radius: f32,
     vertices: [[f32; 3]; VERTICES],
 }
 
 impl Patch {
-    /// Squared distance from the middle within which the `count` nearest of all queries lie, when the last of those
-    /// of the middle is this far: a query lies at most a radius off, so it has as many neighbours no farther than
-    /// that and a radius, and those lie no farther from the middle than a radius more.
-    fn reach(&self, squared: f64) -> f64 {
-        (squared.sqrt() + 2.0 * self.radius).powi(2) * f64::from(SURPLUS)
+    /// Points to compare others with: those near the middle rule out most, the first of them the most. What exceeds
+    /// [`RIVALS`] is not looked at.
+    pub(super) fn rivals(&self, nearest: impl Iterator<Item = [f32; 3]>) -> Rivals {
+        let mut distances = [[[f32::INFINITY; STEP]; VERTICES]; RIVALS / STEP];
+        for (place, rival) in nearest.take(RIVALS).enumerate() {
+            for (distances, &vertex) in distances[place / STEP].iter_mut().zip(&self.vertices) {
+                distances[place % STEP] = SURPLUS * squared_distance(vertex, rival);
+            }
+        }
+        Rivals { vertices: self.vertices, distances }
     }
+}
 
-    /// All normals that a query can have among its `count` nearest, and some more, by number, with the distance of
-    /// the last neighbour of the middle; none if there are not enough.
-    pub(super) fn of_tree(&self, tree: &Tree, count: usize) -> Option<(Vec<Point>, f64)> {
-        let mut nearest = vec![Neighbour::NONE; count];
-        tree.find(self.middle, &mut nearest);
-        let last = nearest.last()?.distance;
-        let mut points = Vec::new();
-        tree.within(self.middle, self.reach(last), &mut points);
-        points.sort_unstable_by_key(|&(_, number)| number);
-        last.is_finite().then_some((points, last.sqrt()))
-    }
+/// Points that may precede others for every query of a patch.
+pub(super) struct Rivals {
+    vertices: [[f32; 3]; VERTICES],
+    /// Squared distances from the vertices, rounded up.
+    distances: [[[f32; STEP]; VERTICES]; RIVALS / STEP],
+}
 
-    /// The same of points, in the order of their numbers, among which they are known to be.
-    pub(super) fn of_points(&self, points: &[Point], count: usize) -> Option<(Vec<Point>, f64)> {
-        let distances: Vec<f64> = points.iter().map(|&(at, _)| squared_distance(at, self.middle)).collect();
-        let mut sorted = distances.clone();
-        let last = *sorted.select_nth_unstable_by(count - 1, f64::total_cmp).1;
-        let reach = self.reach(last);
-        let near = points.iter().zip(distances).filter(|(_, distance)| *distance <= reach);
-        Some((near.map(|(&point, _)| point).collect(), last.sqrt()))
+impl Rivals {
+    /// Whether at least `count` of them precede all points of a box, for every query.
+    #[inline]
+    pub(super) fn precede(&self, kernel: Kernel, low: [f32; 3], high: [f32; 3], count: usize) -> bool {
+        let own = self.vertices.map(|vertex| squared_distance(vertex, nearest_of_box(vertex, low, high)));
+        precede(kernel, &self.distances, &own, count as u32)
     }
+}
 
-    /// Leaves out points that at least `count` others precede for every query.
-    pub(super) fn without_preceded(&self, points: &mut Vec<Point>, count: usize, kernel: Kernel) {
-        let distances: Vec<Vec<f32>> = self
-            .vertices
-            .iter()
-            .map(|vertex| {
-                let to = |&(at, _): &Point| {
-                    let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - vertex[axis]);
-                    x * x + y * y + z * z
-                };
-                points.iter().map(to).collect()
-            })
-            .collect();
-        let mut place = 0;
-        points.retain(|_| {
-            let own: [f32; VERTICES] = std::array::from_fn(|vertex| distances[vertex][place] / SURPLUS);
-            place += 1;
-            let all: [&[f32]; VERTICES] = std::array::from_fn(|vertex| &distances[vertex][..]);
-            (count_preceding(kernel, &all, &own) as usize) < count
-        });
-    }
+/// Squared distance in f32.
+#[inline]
+fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let [x, y, z] = [0, 1, 2].map(|axis| a[axis] - b[axis]);
+    x * x + y * y + z * z
 }
 
 compiled_for_each_kernel! {
-    /// How many points are nearer than `own` to every vertex; `distances` are those of each vertex to all points.
-    fn count_preceding(distances: &[&[f32]; VERTICES], own: &[f32; VERTICES]) -> u32 = count_preceding_body
+    /// Whether at least `count` of the rivals are nearer to every vertex than it is to its `own`.
+    fn precede(distances: &[[[f32; STEP]; VERTICES]], own: &[f32; VERTICES], count: u32) -> bool = precede_body
 }
 
 #[inline(always)]
-fn count_preceding_body(distances: &[&[f32]; VERTICES], own: &[f32; VERTICES]) -> u32 {
-    let count = distances[0].len();
-    let distances = distances.map(|distances| &distances[..count]);
-    let nearer =
-        |point: usize| (0..VERTICES).fold(true, |all, vertex| all & (distances[vertex][point] < own[vertex]));
-    (0..count).map(|point| u32::from(nearer(point))).sum()
+fn precede_body(distances: &[[[f32; STEP]; VERTICES]], own: &[f32; VERTICES], count: u32) -> bool {
+    let mut found = 0;
+    for distances in distances {
+        let mut surplus = [f32::NEG_INFINITY; STEP];
+        for (distances, own) in distances.iter().zip(own) {
+            for (surplus, distance) in surplus.iter_mut().zip(distances) {
+                let here = distance - own;
+                *surplus = if here > *surplus { here } else { *surplus };
+            }
+        }
+        found += surplus.iter().map(|&surplus| surplus.to_bits() >> 31).sum::<u32>(); // counts minus signs
+        if found >= count {
+            return true;
+        }
+    }
+    false
 }

@@ -119,22 +119,24 @@ impl Tree {
         }
     }
 
-    /// Appends the points whose squared distance is at most `limit`, in no particular order.
-    pub fn within(&self, query: [f32; 3], limit: f64, found: &mut Vec<([f32; 3], u32)>) {
+    /// The points that `skip` does not rule out, in no particular order; it is asked of boxes, by their least and
+    /// greatest coordinates, and of each point as a box of its own.
+    pub fn collect(&self, skip: impl Fn([f32; 3], [f32; 3]) -> bool) -> Vec<([f32; 3], u32)> {
+        let mut found = Vec::new();
         let mut open = vec![0];
         while let Some(number) = open.pop() {
             let node = &self.nodes[number as usize];
-            if node.distance(query) > limit {
-                continue;
-            }
-            match node.halves {
-                Some(halves) => open.extend(halves),
-                None => {
-                    let points = &self.points[node.start as usize..node.end as usize];
-                    found.extend(points.iter().filter(|(at, _)| squared_distance(query, *at) <= limit));
+            if !skip(node.low, node.high) {
+                match node.halves {
+                    Some(halves) => open.extend(halves),
+                    None => {
+                        let points = &self.points[node.start as usize..node.end as usize];
+                        found.extend(points.iter().filter(|&&(at, _)| !skip(at, at)));
+                    }
                 }
             }
         }
+        found
     }
 
     /// Bytes held.
@@ -147,7 +149,12 @@ impl Node {
     /// Squared distance to the box: never more than that to a point in it, rounding included,
     /// since every step of the sum is monotone.
     fn distance(&self, query: [f32; 3]) -> f64 {
-        let nearest = std::array::from_fn(|axis| query[axis].max(self.low[axis]).min(self.high[axis]));
-        squared_distance(query, nearest)
+        squared_distance(query, nearest_of_box(query, self.low, self.high))
     }
+}
+
+/// The point of a box that is nearest to another.
+#[inline]
+pub fn nearest_of_box(to: [f32; 3], low: [f32; 3], high: [f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|axis| to[axis].max(low[axis]).min(high[axis]))
 }

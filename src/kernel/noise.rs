@@ -2,7 +2,7 @@
 //! f32 with one order of fused multiply-adds, so that every kernel gives the same bits.
 
 use super::compiled_for_each_kernel;
-use crate::random::{MULTIPLIER, WEYL, normal_quantile, unit_interval};
+use crate::random::{MULTIPLIER, WEYL};
 
 /// Where a row of normals lies.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,6 @@ const PART: usize = 32;
 #[inline(always)]
 fn normals_body(place: Place, out: &mut [f32]) {
     let mut words = [0; STRIP];
-    let mut logarithms = [0.0; STRIP];
     let mut group = (place.first_column >> 2) as u32;
     // The row may begin inside a group.
     let mut skip = place.first_column.rem_euclid(GROUP as i32) as usize;
@@ -45,16 +44,14 @@ fn normals_body(place: Place, out: &mut [f32]) {
         let groups = (skip + count).next_multiple_of(HASHED) / GROUP;
         hash(place, group, groups, &mut words);
         let words = &words[skip..skip + count];
-        for ((normal, logarithm), &word) in here.iter_mut().zip(&mut logarithms).zip(words) {
-            (*normal, *logarithm) = central(word);
+        for (normal, &word) in here.iter_mut().zip(words) {
+            *normal = central(word);
         }
-        let parts = here.chunks_mut(PART).zip(logarithms[..count].chunks(PART)).zip(words.chunks(PART));
-        for ((normals, logarithms), words) in parts {
-            if logarithms.iter().fold(false, |found, &logarithm| found | (logarithm >= CENTRAL)) {
-                for ((normal, &logarithm), &word) in normals.iter_mut().zip(logarithms).zip(words) {
-                    if logarithm >= CENTRAL {
-                        *normal = tail(word);
-                    }
+        for (normals, words) in here.chunks_mut(PART).zip(words.chunks(PART)) {
+            if normals.iter().fold(false, |found, normal| found | normal.is_nan()) {
+                // One by one: in a plain loop the compiler would make the tail of all words, to keep it of few.
+                while let Some(n) = normals.iter().position(|normal| normal.is_nan()) {
+                    normals[n] = tail(words[n]);
                 }
             }
         }
@@ -86,10 +83,10 @@ fn hash(place: Place, first: u32, groups: usize, words: &mut [u32; STRIP]) {
     }
 }
 
-/// Up to here [`central`] holds, in -ln(1 - x^2): up to |z| = 2.93, for 997 words of 1000.
+/// Up to here [`QUANTILE`] holds, in -ln(1 - x^2): up to |z| = 2.93, for 997 words of 1000.
 const CENTRAL: f32 = 5.0;
 
-/// z(p) / x as a polynomial of -ln(1 - x^2) - 2.5, where x = 2 p - 1; the highest power first (a minimax fit with
+/// z(p) / x, where x = 2 p - 1, as a polynomial of -ln(1 - x^2) - 2.5; the highest power first (a minimax fit with
 /// relative error 1e-7; the form is Giles's, "Approximating the erfinv function", 2010).
 const QUANTILE: [f32; 9] = [
     4.035_463_4e-8,
@@ -101,6 +98,19 @@ const QUANTILE: [f32; 9] = [
     -5.908_171e-3,
     3.488_026_6e-1,
     2.123_313_6,
+];
+
+/// Beyond, the same as a polynomial of the root of -ln(1 - x^2) less 3.3, to the last word (relative error 3e-7).
+const TAIL: [f32; 9] = [
+    -2.887_472_5e-5,
+    -2.282_965_4e-4,
+    1.213_639_6e-3,
+    -2.271_761_7e-3,
+    2.984_849e-3,
+    -4.556_104e-3,
+    6.845_68e-3,
+    1.422_361_7,
+    4.432_374,
 ];
 
 /// ln(1 + r) / r for 1 + r from sqrt(1/2) to sqrt(2), the highest power first (a minimax fit with relative error 3e-8).
@@ -121,29 +131,39 @@ fn polynomial(coefficients: &[f32; 9], x: f32) -> f32 {
     coefficients[1..].iter().fold(coefficients[0], |sum, &c| sum.mul_add(x, c))
 }
 
-/// The quantile of a word, which holds up to [`CENTRAL`], and where the word lies on that scale.
+/// The sign bit of x, its magnitude, and -ln(1 - x^2).
 #[inline(always)]
-fn central(word: u32) -> (f32, f32) {
+fn scale(word: u32) -> (u32, f32, f32) {
     const HALF_UNIT: f32 = 1.0 / 4_294_967_296.0;
     const UNIT: f32 = 2.0 * HALF_UNIT;
     const ROOT_HALF: u32 = 0x3f35_04f3;
-    // x in (-1, 1): its magnitude, and 1 less its magnitude exactly, whose logarithm counts in the tails.
-    let signed = (word ^ 0x8000_0000) as i32;
+    let signed = (word ^ SIGN) as i32;
     let magnitude = signed ^ (signed >> 31);
     let x = (magnitude as f32).mul_add(UNIT, HALF_UNIT);
+    // 1 less the magnitude of x, not from x, of which f32 keeps too little in the tails.
     let left = ((magnitude ^ i32::MAX) as f32).mul_add(UNIT, HALF_UNIT);
     let bits = (left * (2.0 - left)).to_bits();
     let exponent = (bits.wrapping_sub(ROOT_HALF) as i32) >> 23;
     let r = f32::from_bits(bits.wrapping_sub((exponent << 23) as u32)) - 1.0;
     let logarithm = -(exponent as f32).mul_add(std::f32::consts::LN_2, r * polynomial(&LOGARITHM, r));
-    let z = x * polynomial(&QUANTILE, logarithm - 2.5);
-    (f32::from_bits(z.to_bits() | (signed as u32 & 0x8000_0000)), logarithm)
+    (signed as u32 & SIGN, x, logarithm)
 }
 
-/// The quantile of one word. Not inlined: the compiler would make it of all words, to keep it of a few.
-#[inline(never)]
+const SIGN: u32 = 0x8000_0000;
+
+/// The quantile of a word up to [`CENTRAL`], NaN beyond.
+#[inline(always)]
+fn central(word: u32) -> f32 {
+    let (sign, x, logarithm) = scale(word);
+    let z = x * polynomial(&QUANTILE, logarithm - 2.5);
+    f32::from_bits(if logarithm < CENTRAL { z } else { f32::NAN }.to_bits() | sign)
+}
+
+/// The quantile of a word beyond [`CENTRAL`].
+#[inline(always)]
 fn tail(word: u32) -> f32 {
-    normal_quantile(unit_interval(word)) as f32
+    let (sign, x, logarithm) = scale(word);
+    f32::from_bits((x * polynomial(&TAIL, logarithm.sqrt() - 3.3)).to_bits() | sign)
 }
 
 compiled_for_each_kernel! {
@@ -156,7 +176,7 @@ compiled_for_each_kernel! {
 mod tests {
     use super::*;
     use crate::kernel::Kernel;
-    use crate::random::philox4x32;
+    use crate::random::{normal_quantile, philox4x32, unit_interval};
 
     fn place(row: i32, first_column: i32) -> Place {
         Place { key: [7, 9], domain: 3, row, first_column, channel: 1 }
@@ -201,17 +221,14 @@ mod tests {
         let mut worst = 0.0_f64;
         for n in 0..=1_000_000_u32 {
             for word in [n, n * 4000, 0x7fff_ffff - n * 2000, 0x7fff_ffff - n] {
-                let (z, logarithm) = central(word);
-                let (opposite, _) = central(!word);
-                assert_eq!(z, -opposite);
-                if logarithm < CENTRAL {
-                    let exact = normal_quantile(unit_interval(word));
-                    worst = worst.max((f64::from(z) - exact).abs() / exact.abs());
-                }
+                let quantile = |word| if central(word).is_nan() { tail(word) } else { central(word) };
+                let (z, exact) = (quantile(word), normal_quantile(unit_interval(word)));
+                assert_eq!(z, -quantile(!word));
+                worst = worst.max((f64::from(z) - exact).abs() / exact.abs());
             }
         }
-        assert!(worst < 5e-7, "{worst}");
-        assert!(normal_quantile(unit_interval(0)) > -6.4);
+        assert!(worst < 7e-7, "{worst}");
+        assert!(tail(0) > -6.4);
     }
 
     #[test]

@@ -1,4 +1,7 @@
-"""The random field: mean, Karhunen-Loeve transform (14), pyramid (4), (5), and the estimates (10)-(12), (20)-(22)."""
+"""The random field: mean, Karhunen-Loeve transform (14), pyramid (4), (5), the estimates (10)-(12), (20)-(22), and what a
+synthesis is told beyond them: gains, covariance, marginals."""
+
+from math import erf
 
 import numpy as np
 
@@ -80,7 +83,7 @@ def check_level(report, store, k, level, band, flat, wraps):
                  f"{len(sites)} sites")
     band = band - band.mean(axis=(0, 1))
     gamma, sigma = store.read(f"mrf/level_{k}/gamma"), store.read(f"mrf/level_{k}/sigma")
-    parts = [band[:, :, c:c + 1] for c in range(3)] if flat else [band]
+    parts = [band[:, :, c:c + 1] for c in range(band.shape[2])] if flat else [band]
     off_gamma, off_sigma, shrunk = [], [], []
     for c, part in enumerate(parts):
         expected, covariance = estimate(*stacked(part, sites, wraps), level)
@@ -98,24 +101,90 @@ def check_level(report, store, k, level, band, flat, wraps):
 
 def transform(report, matrix, centred):
     """T of (15): orthonormal rows that diagonalise (14), largest eigenvalue first."""
-    report.at_most("T is orthonormal", np.abs(matrix @ matrix.T - np.eye(3)).max(), 1e-9)
-    flat = centred.reshape(-1, 3)
+    report.at_most("T is orthonormal", np.abs(matrix @ matrix.T - np.eye(len(matrix))).max(), 1e-9)
+    flat = centred.reshape(-1, len(matrix))
     moments = matrix @ (flat.T @ flat / len(flat)) @ matrix.T
     variances = moments.diagonal()
     report.at_most("T diagonalises (14)", np.abs(moments - np.diag(variances)).max() / variances.sum(), 1e-9)
     report.check("T begins with the largest eigenvalue", (np.diff(variances) <= 0).all(), variances)
 
 
+def covariance(store, levels, flat, side=1024):
+    """Covariance of the sum of all levels at their gains, from their spectra over `side` frequencies along each axis.
+
+    Level k, expanded to the finest lattice, has its spectrum times the product of 4 H(2^j w)^2 over j < k, H the kernel
+    [1 4 6 4 1] / 16 in each direction: the power of expansion averaged over the places of a coarse texel.
+    """
+    gains, w = store.read("mrf/gain"), 2 * np.pi * np.arange(side) / side
+    total = 0
+    for k in range(levels):
+        sites = store.read(f"mrf/level_{k}/neighbourhood")
+        gamma, sigma = store.read(f"mrf/level_{k}/gamma"), store.read(f"mrf/level_{k}/sigma") * gains[k] ** 2
+        c = len(gamma)
+        if flat:
+            gamma = (gamma[:, :, None] * np.eye(c)[:, None, :]).reshape(c, -1)
+            sigma = np.diag(sigma)
+        # Frequencies of the finest lattice that fold onto each of this level's.
+        fine = 2 * np.pi * np.arange(side << k) / (side << k)
+        power = np.prod([2 * np.cos(fine * 2**j / 2) ** 8 for j in range(k)], axis=0) * np.ones(side << k)
+        weight = power.reshape(-1, side).sum(axis=0) / (side << k)
+        for row, down in enumerate(w):
+            a = np.tile(np.eye(c, dtype=complex), (side, 1, 1))
+            for s, (dy, dx) in enumerate(sites):
+                a -= np.exp(-1j * (down * dy + w * dx))[:, None, None] * gamma[:, c * s:c * (s + 1)]
+            inverse = np.linalg.inv(a)
+            spectrum = inverse @ sigma @ inverse.conj().transpose(0, 2, 1)
+            total = total + weight[row] * np.einsum("n,nij->ij", weight, spectrum).real
+    return total
+
+
+def quantile(values, place):
+    """Linear between the middles of sorted values."""
+    position = np.clip(place * len(values) - 0.5, 0, len(values) - 1)
+    return np.interp(position, np.arange(len(values)), values)
+
+
+def marginals(report, store, normals, covariance, kind):
+    """The table of (n_x, n_y) over standardised values from -4 to 4."""
+    table = store.read("mrf/marginals")
+    xy = normals.reshape(-1, 3)[:, :2]
+    xy = xy[np.lexsort((xy[:, 1], xy[:, 0]))]
+    z = np.arange(129) / 16 - 4
+    phi = np.array([0.5 * (1 + erf(value / 2**0.5)) for value in z])
+    rho = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    half, count = max(len(xy) // 48, 32), len(xy)
+    worst = np.abs(table[:, :, 0] - quantile(xy[:, 0], phi)[:, None]).max()
+    for row in range(0, 129, 8):
+        if kind == "joint":
+            middle = int(phi[row] * count)
+            near = np.sort(xy[min(max(middle - half, 0), count - 1):min(middle + half, count), 1])
+            expected = quantile(near, phi)
+        else:
+            mixed = rho * z[row] + np.sqrt(1 - rho**2) * z
+            expected = quantile(np.sort(xy[:, 1]), np.array([0.5 * (1 + erf(v / 2**0.5)) for v in mixed]))
+        worst = max(worst, np.abs(table[row, :, 1] - expected).max())
+    report.at_most(f"table of {kind} marginals", worst, 1e-5)
+
+
 def field(report, store):
     normals = store.read("normals").astype(float)
-    mean = store.read("mrf/mean")
-    report.at_most("mean of the field", np.abs(mean - normals.mean(axis=(0, 1))).max(), 1e-9)
     fit = store.attributes["stages"]["fit"]["report"]
     wraps = store.attributes["stages"]["tile"]["report"]["wraps"]
-    data, flat = normals - mean, fit["mrf"] == "2d"
+    data, flat = normals, fit["mrf"] == "2d"
+    if fit["field"] == "slopes":
+        data = normals[:, :, :2] / np.maximum(normals[:, :, 2:], 0.05)
+    mean = store.read("mrf/mean")
+    report.at_most("mean of the field", np.abs(mean - data.mean(axis=(0, 1))).max(), 1e-9)
+    data = data - mean
+    matrix = np.eye(len(mean))
     if flat:
         matrix = store.read("mrf/transform")
         transform(report, matrix, data)
         data = data @ matrix.T
     for k, band in enumerate(laplacian(data, len(fit["levels"]), wraps)):
         check_level(report, store, k, fit["levels"][k], band, flat, wraps)
+    told = store.read("mrf/covariance")
+    expected = matrix.T @ covariance(store, len(fit["levels"]), flat) @ matrix
+    report.at_most("covariance of a synthesis", relative(told, expected), 0.02)
+    if fit["marginals"]:
+        marginals(report, store, normals, told, fit["marginals"])

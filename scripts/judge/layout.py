@@ -96,17 +96,23 @@ def model(report, store, measured):
 
 def field_arrays(fit):
     """The arrays under `mrf/`."""
-    flat = fit["mrf"] == "2d"
-    expected = {"mrf/mean": ((3,), "float64", "channel")}
+    flat, c = fit["mrf"] == "2d", 2 if fit["field"] == "slopes" else 3
+    square = ((c, c), "float64", "channel channel_other")
+    expected = {
+        "mrf/mean": ((c,), "float64", "channel"),
+        "mrf/covariance": square,
+        "mrf/gain": ((len(fit["levels"]),), "float64", "level"),
+    }
     if flat:
-        expected["mrf/transform"] = ((3, 3), "float64", "component channel")
+        expected["mrf/transform"] = ((c, c), "float64", "component channel")
+    if fit["marginals"]:
+        expected["mrf/marginals"] = ((129, 129, 2), "float32", "z1 z2 xy")
     for k, level in enumerate(fit["levels"]):
         eta = level["eta"]
         expected |= {
             f"mrf/level_{k}/neighbourhood": ((eta, 2), "int32", "site dy_dx"),
-            f"mrf/level_{k}/gamma": ((3, eta if flat else 3 * eta), "float64", "channel coefficient"),
-            f"mrf/level_{k}/sigma": ((3,), "float64", "channel") if flat
-                                    else ((3, 3), "float64", "channel channel_other"),
+            f"mrf/level_{k}/gamma": ((c, eta if flat else c * eta), "float64", "channel coefficient"),
+            f"mrf/level_{k}/sigma": ((c,), "float64", "channel") if flat else square,
         }
     return expected
 

@@ -50,7 +50,11 @@ pub fn fit(field: &Field, options: &Options) -> Result<Model> {
     let Choice { levels, covariance, autocovariance_error } = choices
         .reduce(|best, next| {
             let (best, next) = (best?, next?);
-            Ok(if next.autocovariance_error < WORTH_A_LEVEL * best.autocovariance_error { next } else { best })
+            Ok(if next.autocovariance_error < WORTH_A_LEVEL * best.autocovariance_error {
+                next
+            } else {
+                best
+            })
         })
         .ok_or_else(|| Error::internal("a pyramid of no levels"))??;
     let covariance = match &transform {

@@ -259,7 +259,7 @@ fn no_flipped_bit_of_a_models_metadata_brings_the_reader_down() {
     let read = || -> btfkit::Result<()> {
         let model = Model::open(&path)?;
         let (_, _, _, _) = (model.tile()?, model.index()?, model.normals()?, model.distance()?);
-        let (_, _, _) = (model.representatives()?, model.field()?, model.triangles()?);
+        let (_, _, _) = (model.representatives()?, model.surface()?, model.triangles()?);
         model.digest().map(drop)
     };
     read().unwrap();
@@ -273,6 +273,8 @@ fn no_flipped_bit_of_a_models_metadata_brings_the_reader_down() {
         "representatives/zarr.json",
         "view_triangles/zarr.json",
         "mrf/mean/zarr.json",
+        "mrf/gain/zarr.json",
+        "mrf/marginals/zarr.json",
         "mrf/level_0/gamma/zarr.json",
         "mrf/level_0/neighbourhood/zarr.json",
     ] {

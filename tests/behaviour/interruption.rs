@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::fixture::{assert_same, btf, enlarge, fixture, succeed};
+use crate::fixture::{assert_same, btf, enlarge, fail, fixture, succeed};
 
 /// Starts a command, waits until `ready`, and sends `signal`. Returns the exit code, none where it was killed.
 fn interrupt(command: &mut Command, signal: &str, ready: impl Fn() -> bool) -> Option<i32> {
@@ -52,16 +52,53 @@ fn an_enlargement_killed_half_way_goes_on_to_the_same_bytes() {
     assert_same(&output, &fixture().enlarged());
 }
 
+/// An enlargement of many rows of shards, with its state beside them, killed once there is one.
+fn killed_with_a_state(output: &Path, more: &[&str]) -> Command {
+    let run = || {
+        let mut command = btf();
+        command.arg("enlarge").args([&fixture().model(), output]).args(["--size", "520x3000"]).args(more);
+        command
+    };
+    let code = interrupt(&mut run(), "-KILL", || output.join("enlarge-state").exists());
+    assert_eq!(code, None, "the enlargement ended before it was killed");
+    run()
+}
+
 #[test]
-fn an_enlargement_goes_on_after_whole_rows_of_shards() {
+fn a_killed_enlargement_goes_on_after_its_last_row_of_shards() {
     let folder = tempfile::tempdir().unwrap();
-    let output = folder.path().join("half");
-    let mut command = enlarge(&fixture().model(), &output);
-    succeed(&mut command);
-    std::fs::remove_dir_all(output.join("index/c/1")).unwrap();
+    for more in [&[][..], &["--tileable", "--keep-normals"]] {
+        let (output, undisturbed) = (folder.path().join("killed"), folder.path().join("undisturbed"));
+        let mut command = killed_with_a_state(&output, more);
+        let told = succeed(&mut command);
+        assert!(!told.contains(" 0 found done"), "{told}");
+        let whole = ["--size", "520x3000"];
+        succeed(btf().arg("enlarge").args([&fixture().model(), &undisturbed]).args(whole).args(more));
+        assert_same(&output, &undisturbed);
+        for store in [output, undisturbed] {
+            std::fs::remove_dir_all(store).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_damaged_state_and_one_of_another_recipe_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
+    let mut command = killed_with_a_state(&first, &[]);
+    let mut other = killed_with_a_state(&second, &["--seed", "2"]);
+    let state = first.join("enlarge-state");
+    let whole = std::fs::read(&state).unwrap();
+    std::fs::copy(second.join("enlarge-state"), &state).unwrap();
+    let told = fail(&mut command, 65);
+    assert!(told.contains("enlarge-state: the state of another recipe"), "{told}");
+    std::fs::write(&state, &whole[..whole.len() - 1]).unwrap();
+    let told = fail(&mut command, 65);
+    assert!(told.contains("enlarge-state") && told.contains("delete this file"), "{told}");
+    std::fs::remove_file(&state).unwrap();
     let told = succeed(&mut command);
-    assert!(told.contains("1 rows of shards written, 1 found done"), "{told}");
-    assert_same(&output, &fixture().enlarged());
+    assert!(told.contains(" 0 found done"), "{told}");
+    succeed(&mut other);
 }
 
 #[test]

@@ -142,3 +142,67 @@ impl Kernel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Hash;
+
+    #[test]
+    fn two_that_f32_cannot_tell_apart_are_found_at_every_rank() {
+        let query = [0.0, 0.0, 1.0];
+        for rank in 0..CAPACITY - 1 {
+            for count in [rank + 2, CAPACITY] {
+                // The farther one has the smaller number: squares of 1 + 2^-23 and 1 are one step apart.
+                let mut distances: Vec<f32> =
+                    (0..count).map(|place| 0.5f32.powi(place as i32 % 8) * (1 + place / 8) as f32).collect();
+                distances.sort_by(f32::total_cmp);
+                distances.dedup();
+                let Some(&near) = distances.get(rank) else { continue };
+                distances.retain(|&distance| distance != near);
+                let points = [near.next_up(), near].into_iter().chain(distances);
+                let candidates = Candidates::new(
+                    points.take(CAPACITY).zip(0..).map(|(x, number)| ([x, 0.0, 1.0], number)),
+                );
+                let mut expected = [9; RANKS];
+                candidates.rank(query, &mut expected);
+                let known = candidates.len().min(RANKS);
+                for kernel in Kernel::available() {
+                    let mut found = [[7; RANKS]; BATCH];
+                    kernel.rank(&[&candidates; BATCH], &[query; BATCH], &mut found);
+                    for found in found {
+                        assert_eq!(found[..known], expected[..known], "{kernel:?}, {rank} of {count}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_query_is_ranked_among_its_own() {
+        let hash = Hash::new(8, 0);
+        let vector = |n: u32, of: u32| {
+            let [x, y, z, _] = hash.uniforms(n, of, 0);
+            [x, y, z].map(|v| v as f32)
+        };
+        for round in 0..20 {
+            let candidates: [Candidates; BATCH] = std::array::from_fn(|query| {
+                let of = round * BATCH as u32 + query as u32;
+                let count = 16 + hash.below(33, of, 1, 1) as u32;
+                Candidates::new((0..count).map(|n| (vector(n, of), 3 * n + of)))
+            });
+            let queries = std::array::from_fn(|query| vector(query as u32, 1 << 20 | round));
+            let candidates = std::array::from_fn(|query| &candidates[query]);
+            let mut expected = [[9; RANKS]; BATCH];
+            Kernel::Plain.rank(&candidates, &queries, &mut expected);
+            for (query, expected) in expected.iter().enumerate() {
+                assert!(expected.iter().all(|number| number % 3 == (round * 16 + query as u32) % 3));
+            }
+            for kernel in Kernel::available() {
+                let mut found = [[7; RANKS]; BATCH];
+                kernel.rank(&candidates, &queries, &mut found);
+                assert_eq!(found, expected, "{kernel:?}");
+            }
+        }
+    }
+}

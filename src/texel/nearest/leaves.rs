@@ -146,7 +146,7 @@ impl Leaves {
 fn cut(square: Square, held: &[usize], squares: &mut Vec<(usize, Square)>) {
     let sum = cells(square).map(|cell| held[cell]).sum();
     if square.level < GRID_LEVEL && sum > 0 {
-        square.quarters().map(|quarter| cut(quarter, held, squares));
+        square.quarters().into_iter().for_each(|quarter| cut(quarter, held, squares));
     } else if !square.is_outside() {
         squares.push((sum, square));
     }

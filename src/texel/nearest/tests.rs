@@ -61,6 +61,7 @@ fn ties_of_rounded_and_equal_normals_go_to_the_smaller_texel_number() {
         for step in [step, step / 2.0, 0.0] {
             let queries = self::normals(150, [0.25, 0.25], step, 1);
             check(&normals, &queries, 16);
+            check(&normals, &queries, 17); // all by the tree
         }
     }
     check(&vec![[0.0, 0.0, 1.0]; 40], &normals(32, [0.1, 0.1], 0.0, 1), 16);

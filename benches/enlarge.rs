@@ -1,33 +1,100 @@
 //! What an enlarged index is made of, kernel by kernel: `cargo bench --bench enlarge`.
 //!
-//! `scripts/bench-enlarge` runs it beside the same work of others.
-#![allow(clippy::expect_used)]
+//! `scripts/bench-enlarge` runs it beside the same work of others, with `--cpu`: the same work timed by the processor
+//! instead of the clock, which other programs disturb; prints a JSON object a line.
+#![allow(clippy::expect_used, clippy::print_stdout)]
+
+use std::fs;
 
 use btfkit::kernel::Kernel;
 use btfkit::kernel::car::{Coefficients, Ends, Field};
 use btfkit::random::Hash;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use serde_json::json;
 
 fn main() {
-    divan::main();
+    if std::env::args().any(|argument| argument == "--cpu") {
+        by_processor();
+    } else {
+        divan::main();
+    }
+}
+
+/// Nanoseconds that this thread has run.
+fn cpu_ns() -> f64 {
+    let text = fs::read_to_string("/proc/thread-self/schedstat").expect("a kernel that counts");
+    text.split(' ').next().and_then(|field| field.parse().ok()).expect("a count")
+}
+
+/// The median over some runs of processor time for each item, nanoseconds. A run repeats the work until many ticks have
+/// passed, by which the kernel counts.
+fn median_ns(items: usize, mut work: impl FnMut()) -> f64 {
+    const RUNS: usize = 7;
+    const RUN_NS: f64 = 3e8;
+    work();
+    let mut run = || {
+        let (start, mut count) = (cpu_ns(), 0);
+        loop {
+            work();
+            count += 1;
+            let passed = cpu_ns() - start;
+            if passed > RUN_NS {
+                return passed / (count * items) as f64;
+            }
+        }
+    };
+    let mut times: Vec<f64> = (0..RUNS).map(|_| run()).collect();
+    times.sort_by(f64::total_cmp);
+    times[RUNS / 2]
+}
+
+fn by_processor() {
+    let texels = HEIGHT * WIDTH;
+    for kernel in Kernel::available() {
+        let mut row = vec![0.0; 3 * WIDTH];
+        let ns = median_ns(3 * texels, || (0..HEIGHT).for_each(|_| noise_row(kernel, &mut row)));
+        println!("{}", json!({"work": "noise", "kernel": format!("{kernel:?}"), "cpu_ns": ns}));
+    }
+    let noise = noise_in_memory();
+    for (kernel, sites) in cases() {
+        let mut field = Car::new(sites).field(kernel);
+        let car = median_ns(texels, || car_rows(&mut field, &noise));
+        let both = median_ns(texels, || noise_and_car_rows(&mut field, kernel));
+        for (work, ns) in [("car", car), ("noise and car", both)] {
+            let kernel = format!("{kernel:?}");
+            println!("{}", json!({"work": work, "kernel": kernel, "neighbours": sites, "cpu_ns": ns}));
+        }
+    }
 }
 
 /// Texels of a row, and rows.
 const WIDTH: usize = 1024;
 const HEIGHT: usize = 256;
 
-/// A row of noise of three channels, a normal counted as an item.
+/// A row of noise of three channels.
+fn noise_row(kernel: Kernel, row: &mut [f32]) {
+    let hash = Hash::new(1, 0);
+    for (channel, row) in row.chunks_exact_mut(WIDTH).enumerate() {
+        hash.normal_row(kernel, 5, black_box(-256), channel as u32, row);
+    }
+    black_box(row);
+}
+
+/// A normal is an item.
 #[divan::bench(args = Kernel::available())]
 fn noise(bencher: Bencher<'_, '_>, kernel: Kernel) {
-    let hash = Hash::new(1, 0);
     let mut row = vec![0.0; 3 * WIDTH];
-    bencher.counter(ItemsCount::new(3 * WIDTH)).bench_local(|| {
-        for (channel, row) in row.chunks_exact_mut(WIDTH).enumerate() {
-            hash.normal_row(kernel, 5, black_box(-256), channel as u32, row);
-        }
-        black_box(&mut row);
-    });
+    bencher.counter(ItemsCount::new(3 * WIDTH)).bench_local(|| noise_row(kernel, &mut row));
+}
+
+/// Rows of three channels.
+fn noise_in_memory() -> Vec<f32> {
+    let mut noise = vec![0.0; HEIGHT * 3 * WIDTH];
+    for (row, noise) in noise.chunks_exact_mut(WIDTH).enumerate() {
+        Hash::new(1, 0).normal_row(Kernel::fastest(), row as i32, 0, 0, noise);
+    }
+    noise
 }
 
 /// A field of three channels and `sites` neighbours, nearest first; noise is there already.
@@ -59,34 +126,36 @@ impl Car {
     }
 }
 
-/// Rows of a field from noise in memory, a texel counted as an item.
-#[divan::bench(args = cases())]
-fn car(bencher: Bencher<'_, '_>, (kernel, sites): &(Kernel, usize)) {
-    let mut noise = vec![0.0; HEIGHT * 3 * WIDTH];
-    for (row, noise) in noise.chunks_exact_mut(WIDTH).enumerate() {
-        Hash::new(1, 0).normal_row(Kernel::fastest(), row as i32, 0, 0, noise);
+/// Rows of a field from noise in memory.
+fn car_rows(field: &mut Field, noise: &[f32]) {
+    for noise in black_box(noise).chunks_exact(3 * WIDTH) {
+        field.advance(|channel, at, out| out.copy_from_slice(&noise[channel * WIDTH + at..][..out.len()]));
     }
-    let mut field = Car::new(*sites).field(*kernel);
-    bencher.counter(ItemsCount::new(HEIGHT * WIDTH)).bench_local(|| {
-        for noise in black_box(&noise).chunks_exact(3 * WIDTH) {
-            field
-                .advance(|channel, at, out| out.copy_from_slice(&noise[channel * WIDTH + at..][..out.len()]));
-        }
-        black_box(field.row(0, 2)[WIDTH - 1])
-    });
+    black_box(field.row(0, 2)[WIDTH - 1]);
 }
 
 /// The same with its noise.
+fn noise_and_car_rows(field: &mut Field, kernel: Kernel) {
+    let hash = Hash::new(1, 0);
+    for row in 0..HEIGHT as i32 {
+        field.advance(|channel, at, out| hash.normal_row(kernel, row, at as i32, channel as u32, out));
+    }
+    black_box(field.row(0, 2)[WIDTH - 1]);
+}
+
+/// A texel is an item.
+#[divan::bench(args = cases())]
+fn car(bencher: Bencher<'_, '_>, (kernel, sites): &(Kernel, usize)) {
+    let noise = noise_in_memory();
+    let mut field = Car::new(*sites).field(*kernel);
+    bencher.counter(ItemsCount::new(HEIGHT * WIDTH)).bench_local(|| car_rows(&mut field, &noise));
+}
+
+/// A texel is an item.
 #[divan::bench(args = cases())]
 fn noise_and_car(bencher: Bencher<'_, '_>, (kernel, sites): &(Kernel, usize)) {
-    let hash = Hash::new(1, 0);
     let mut field = Car::new(*sites).field(*kernel);
-    bencher.counter(ItemsCount::new(HEIGHT * WIDTH)).bench_local(|| {
-        for row in 0..HEIGHT as i32 {
-            field.advance(|channel, at, out| hash.normal_row(*kernel, row, at as i32, channel as u32, out));
-        }
-        black_box(field.row(0, 2)[WIDTH - 1])
-    });
+    bencher.counter(ItemsCount::new(HEIGHT * WIDTH)).bench_local(|| noise_and_car_rows(&mut field, *kernel));
 }
 
 fn cases() -> Vec<(Kernel, usize)> {

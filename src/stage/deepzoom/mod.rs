@@ -138,7 +138,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         window: None,
     })?;
     scene.expose(options.exposure);
-    let direction = |direction: Direction| json!([direction.theta_rad, direction.phi_rad]);
+    let direction = |direction: Direction| json!(direction.degrees());
     let recipe = json!({
         "stage": "deepzoom", "method": METHOD,
         "source": scene.recipe(),

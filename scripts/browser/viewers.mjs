@@ -162,7 +162,7 @@ async function missing_tile() {
 
 try {
   await in_openseadragon("png", 1, 0.01);
-  await in_openseadragon("jpeg", 120, 6);
+  await in_openseadragon("jpeg", 40, 4);
   await in_our_page("served", `${site}/png.html`);
   await in_our_page("file", pathToFileURL(join(work, "png.html")).href);
   await missing_tile();

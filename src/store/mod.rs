@@ -31,6 +31,7 @@ use crate::run::recipe;
 pub use codec::Chain;
 use codec::Codecs;
 pub use lock::Lock;
+pub(crate) use lock::is_lock;
 use mapped::MappedStorage;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
@@ -183,7 +184,7 @@ impl Store {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 // What a killed writer left of its first file is no obstacle.
                 let is_leftover = |entry: std::io::Result<std::fs::DirEntry>| {
-                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()) || lock::is_lock(&e.path()))
+                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()) || is_lock(&e.path()))
                 };
                 let occupied =
                     std::fs::read_dir(&self.path).is_ok_and(|mut entries| !entries.all(is_leftover));

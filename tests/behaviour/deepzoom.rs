@@ -145,8 +145,8 @@ fn every_level_is_the_mean_in_linear_light_of_the_one_above() {
             "--overlap",
             &overlap_text,
         ]));
-        // The recipe is the only file beside the tiles.
-        assert_eq!(check_all(&fixture().enlarged(), &output, side, overlap), 1);
+        // The recipe and the lock are the only files beside the tiles.
+        assert_eq!(check_all(&fixture().enlarged(), &output, side, overlap), 2);
     }
     // Means of display values would be darker by more than these tests allow.
     let linear = Linear::of(&fixture().enlarged());
@@ -219,7 +219,7 @@ fn measurements_and_tiles_of_models_become_pyramids_too() {
 fn threads_and_memory_change_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     for (name, common) in
-        [("one", ["--threads", "1", "--memory", "5200KiB"]), ("two", ["--threads", "2", "--memory", "1GiB"])]
+        [("one", ["--threads", "1", "--memory", "17500KiB"]), ("two", ["--threads", "2", "--memory", "1GiB"])]
     {
         let output = folder.path().join(name).join("big.dzi");
         std::fs::create_dir(folder.path().join(name)).unwrap();
@@ -228,7 +228,7 @@ fn threads_and_memory_change_no_byte() {
     let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
     assert_same(&one, &two);
     let told =
-        fail(export(&fixture().enlarged(), &folder.path().join("none.dzi")).args(["--memory", "3MiB"]), 2);
+        fail(export(&fixture().enlarged(), &folder.path().join("none.dzi")).args(["--memory", "16MiB"]), 2);
     assert!(told.contains("--memory"), "{told}");
     assert!(!folder.path().join("none_files").exists());
 }

@@ -167,7 +167,7 @@ fn the_memory_that_is_allowed_changes_no_byte_of_a_picture_and_too_little_is_ref
     for (number, source) in [fixture().enlarged(), fixture().measurement()].iter().enumerate() {
         for ending in ["png", "exr"] {
             let [little, much] = ["little", "much"].map(|name| format!("{name}-{number}.{ending}"));
-            succeed(&mut image(source, "4200KiB", &little));
+            succeed(&mut image(source, "16488KiB", &little));
             succeed(&mut image(source, "1GiB", &much));
             assert_eq!(
                 std::fs::read(folder.path().join(little)).unwrap(),
@@ -175,6 +175,6 @@ fn the_memory_that_is_allowed_changes_no_byte_of_a_picture_and_too_little_is_ref
             );
         }
     }
-    let told = crate::fixture::fail(&mut image(&fixture().enlarged(), "4100KiB", "none.png"), 2);
+    let told = crate::fixture::fail(&mut image(&fixture().enlarged(), "16388KiB", "none.png"), 2);
     assert!(told.contains("--memory"), "{told}");
 }

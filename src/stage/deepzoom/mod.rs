@@ -32,8 +32,8 @@ use pyramid::Pyramid;
 /// Sides of a tile that are allowed.
 pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
 
-/// Memory for what does not grow with the picture.
-const FIXED_BYTES: u64 = 4 << 20;
+/// Memory for what does not grow with the picture: the program itself, threads, packers.
+const FIXED_BYTES: u64 = 16 << 20;
 
 /// Format of the tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,11 +168,12 @@ impl Plan {
         })
     }
 
-    /// Memory of the levels and of the tiles in work; bands of the source come on top of it.
+    /// Memory of the levels, a row of the source and the tiles in work; bands of the source come on top of it.
     fn memory_bytes(&self, context: &Context<'_>) -> u64 {
         let tile = 3 * (self.pyramid.side + 2 * self.pyramid.overlap).pow(2) as u64;
         // Pixels, filtered or transformed pixels, and the file.
-        FIXED_BYTES + Cascade::memory_bytes(&self.pyramid) + context.threads as u64 * 4 * tile
+        let row = (self.pyramid.size.width * size_of::<[f32; 3]>()) as u64;
+        FIXED_BYTES + Cascade::memory_bytes(&self.pyramid) + row + context.threads as u64 * 4 * tile
     }
 
     /// Makes the tiles that are not there yet, then the page and the description.

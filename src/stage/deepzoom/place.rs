@@ -11,6 +11,7 @@ use super::Encoding;
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::store::mapped::{self, MappedStorage, write_file};
+use crate::store::{Store, is_lock};
 
 /// Name of the file with the recipe.
 const STATE: &str = "btfkit.json";
@@ -67,7 +68,7 @@ impl Place {
             Err(error) => return Err(Error::io("read", &path, error)),
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry.is_ok_and(|entry| mapped::is_temporary(&entry.path()))
+            entry.is_ok_and(|entry| mapped::is_temporary(&entry.path()) || is_lock(&entry.path()))
         };
         let strange = std::fs::read_dir(&self.folder).is_ok_and(|mut entries| !entries.all(is_ours));
         let occupied = [(&self.folder, strange || self.folder.is_file())]
@@ -85,6 +86,9 @@ impl Place {
 
     /// Writes the recipe, unless it is there, and removes what killed writers left.
     pub(super) fn begin(&self, recipe: &Value) -> Result<()> {
+        // Looked at before the lock, which leaves a file: none in a folder that is not ours.
+        self.check(recipe)?;
+        let _lock = Store::at(&self.folder).lock("")?;
         self.check(recipe)?;
         MappedStorage::new(&self.folder).sweep()?;
         let path = self.folder.join(STATE);

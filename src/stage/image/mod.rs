@@ -19,8 +19,8 @@ use btfkit_formats::Direction;
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
 
-/// Memory for what does not grow with a picture: packers and buffers.
-const WRITING_BYTES: u64 = 4 << 20;
+/// Memory for what does not grow with a picture: the program itself, packers, buffers.
+const WRITING_BYTES: u64 = 16 << 20;
 
 /// What to show.
 #[derive(Clone, Copy, Debug, PartialEq)]

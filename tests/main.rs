@@ -11,6 +11,8 @@ mod check;
 mod clusters;
 #[path = "behaviour/curve.rs"]
 mod curve;
+#[path = "behaviour/deepzoom.rs"]
+mod deepzoom;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
 #[path = "behaviour/equations.rs"]

@@ -6,9 +6,10 @@ use btfkit::stage::export::{self, Format};
 use btfkit::store::measurement::Measurement;
 use clap::{Args, ValueEnum};
 
+use super::deepzoom::Deepzoom;
 use super::{Tell, bytes_text};
 
-/// Measurement to archive: UBO2003 zip, EXR or PNG folder, HDF5, npy, Bonn DFMF or FMF
+/// Measurement to archive (UBO2003 zip, EXR or PNG folder, HDF5, npy, Bonn DFMF or FMF), picture to Deep Zoom tiles
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -17,21 +18,27 @@ Examples:
   btf export wood.zarr wood-exr --to exr              a folder of linear pictures
   btf export wood.zarr wood.zip --quality 95          JPEGs named as in UBO2003 (lossy)
   btf export wood.zarr wood.btf --rank 100            for viewers of Bonn's containers; without --rank it is exact, and as large as the raw data
-Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.")]
+  btf export wood-4k.zarr wood.dzi --deepzoom --light 60,90 --format jpeg
+                                                      tiles for OpenSeadragon and others, and wood.html to look at them
+Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.
+A pyramid of tiles is made of measurements, models and enlarged indices of any size, as `btf image` shows them; interrupted, the same
+command goes on.")]
 pub(super) struct Export {
-    /// A measurement
+    /// A measurement; for --deepzoom a model or an enlarged index too
     store: PathBuf,
     /// The file or folder to make
     output: PathBuf,
-    /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF]
-    #[arg(long, value_enum)]
+    /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF, .dzi Deep Zoom]
+    #[arg(long, value_enum, conflicts_with = "deepzoom")]
     to: Option<FormatName>,
     /// Components of a factorised container [default: all]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     rank: Option<u32>,
-    /// JPEG quality
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u8).range(1..=100))]
-    quality: u8,
+    /// JPEG quality [default: 100, of tiles 90]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
+    quality: Option<u8>,
+    #[command(flatten)]
+    deepzoom: Deepzoom,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -47,6 +54,9 @@ enum FormatName {
 
 impl Export {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
+            return self.deepzoom.run(&self.store, &self.output, self.quality, context, tell);
+        }
         let format = match self.to {
             Some(FormatName::Ubo2003) => Format::Ubo2003,
             Some(FormatName::Exr) => Format::Exr,
@@ -65,7 +75,7 @@ impl Export {
             output: self.output.clone(),
             format,
             rank: self.rank.map(|rank| rank as usize),
-            quality: self.quality,
+            quality: self.quality.unwrap_or(100),
         };
         let report = export::run(&measurement, &options, context)?;
         tell.line(format!("{}: {}", self.output.display(), bytes_text(report.bytes)));

@@ -1,7 +1,6 @@
 use std::path::PathBuf;
 
 use btfkit::error::Result;
-use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Window;
 use btfkit::stage::image;
@@ -57,7 +56,6 @@ enum What {
 
 impl Image {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        Ending::of(&self.out)?;
         let subject = match self.what {
             What::Appearance => image::Subject::Appearance { view: self.view, light: self.light },
             What::Index => image::Subject::Index,
@@ -69,12 +67,8 @@ impl Image {
             subject,
             window: self.window,
         };
-        let mut picture = image::run(&options, context)?;
-        if matches!(self.what, What::Appearance) {
-            picture = picture.exposed(self.exposure);
-        }
-        picture.write(&self.out)?;
-        tell.line(format!("{}: {}", self.out.display(), picture.size));
+        let size = image::run(&options, self.exposure, &self.out, context)?;
+        tell.line(format!("{}: {size}", self.out.display()));
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 mod analyse;
 mod check;
 mod curve;
+mod deepzoom;
 mod demo;
 mod enlarge;
 mod export;

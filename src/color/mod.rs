@@ -4,9 +4,11 @@
 
 mod channels;
 mod codes;
+mod display;
 
 pub use channels::{Decoder, Weights, weights};
 pub use codes::{LightnessCodes, Remarkable};
+pub use display::srgb_encode_all;
 
 use serde::{Deserialize, Serialize};
 

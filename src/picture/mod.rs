@@ -3,10 +3,11 @@
 pub mod chart;
 pub mod drawing;
 pub mod false_color;
+pub mod stream;
 
 use std::path::Path;
 
-use crate::color::srgb_encode_u8;
+use crate::color::srgb_encode_all;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
 use crate::store::mapped::write_file;
@@ -18,6 +19,20 @@ pub enum Meaning {
     Linear,
     /// Display values 0..1 as they are: false colours.
     Display,
+}
+
+impl Meaning {
+    /// 8-bit display values of pixels, three a pixel.
+    pub fn encode(self, pixels: &[[f32; 3]], bytes: &mut [u8]) {
+        let values = pixels.as_flattened().iter();
+        match self {
+            Self::Linear => srgb_encode_all(values.copied(), bytes),
+            Self::Display => {
+                let byte = |value: &f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+                values.zip(bytes).for_each(|(value, to)| *to = byte(value));
+            }
+        }
+    }
 }
 
 /// An RGB picture, row 0 at the top.
@@ -44,11 +59,9 @@ impl Picture {
 
     /// 8-bit display values, row by row.
     pub fn bytes(&self) -> Vec<u8> {
-        let byte = |value: f32| match self.meaning {
-            Meaning::Linear => srgb_encode_u8(f64::from(value)),
-            Meaning::Display => (value.clamp(0.0, 1.0) * 255.0).round() as u8,
-        };
-        self.pixels.iter().flatten().map(|&value| byte(value)).collect()
+        let mut bytes = vec![0; 3 * self.pixels.len()];
+        self.meaning.encode(&self.pixels, &mut bytes);
+        bytes
     }
 
     /// The same picture as display values.
@@ -110,32 +123,17 @@ impl Picture {
 
     /// The bytes of a PNG file.
     pub fn png(&self) -> Result<Vec<u8>> {
-        let failed = |error: png::EncodingError| Error::internal(format!("cannot encode a PNG: {error}"));
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.size.width as u32, self.size.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        let mut writer = encoder.write_header().map_err(failed)?;
-        writer.write_image_data(&self.bytes()).map_err(failed)?;
-        writer.finish().map_err(failed)?;
-        Ok(bytes)
+        png(self.size, &self.bytes())
     }
 
     /// The bytes of an EXR file: the values as 32-bit floats.
     pub fn exr(&self) -> Result<Vec<u8>> {
-        use exr::prelude::{SpecificChannels, WritableImage};
-        let width = self.size.width;
-        let channels = SpecificChannels::rgb(|place: exr::math::Vec2<usize>| {
-            let [r, g, b] = self.pixels[place.y() * width + place.x()];
-            (r, g, b)
-        });
         let mut bytes = std::io::Cursor::new(Vec::new());
-        exr::image::Image::from_channels((width, self.size.height), channels)
-            .write()
-            .non_parallel()
-            .to_buffered(&mut bytes)
-            .map_err(|error| Error::internal(format!("cannot encode an EXR: {error}")))?;
+        let mut rows = self.pixels.chunks_exact(self.size.width);
+        stream::exr(&mut bytes, self.size, |row| {
+            rows.next().into_iter().for_each(|pixels| row.copy_from_slice(pixels));
+            Ok(())
+        })?;
         Ok(bytes.into_inner())
     }
 
@@ -147,6 +145,15 @@ impl Picture {
         };
         write_file(path, &bytes)
     }
+}
+
+/// The bytes of a PNG file of 8-bit display values, three a pixel.
+pub fn png(size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut writer = stream::png_header(&mut bytes, size)?;
+    writer.write_image_data(pixels).map_err(|error| stream::png_failed(&error))?;
+    writer.finish().map_err(|error| stream::png_failed(&error))?;
+    Ok(bytes)
 }
 
 /// Formats of pictures, by the endings of their names.

@@ -3,6 +3,7 @@
 pub mod check;
 pub mod cluster;
 pub mod compare;
+pub mod deepzoom;
 pub mod enlarge;
 pub mod estimate;
 pub mod export;

@@ -16,7 +16,7 @@ pub const KIND: &str = "enlarged";
 pub const SHARD_SIDE: usize = 512;
 
 /// Side of a chunk in texels.
-const CHUNK_SIDE: usize = 128;
+pub const CHUNK_SIDE: usize = 128;
 
 /// An enlarged index store.
 pub struct Enlarged {
@@ -83,6 +83,11 @@ impl Enlarged {
     /// Rows and columns.
     pub fn size(&self) -> Size {
         self.size
+    }
+
+    /// Whether the synthesised normals were kept.
+    pub fn has_normals(&self) -> bool {
+        self.normals.is_some()
     }
 
     /// Number of rows of shards, each [`SHARD_SIDE`] texels high (the last may be cut off).

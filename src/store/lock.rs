@@ -29,6 +29,6 @@ impl Lock {
 }
 
 /// Whether a file is one of these.
-pub(super) fn is_lock(path: &Path) -> bool {
+pub(crate) fn is_lock(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PREFIX))
 }

@@ -15,6 +15,7 @@ pub mod output;
 pub mod passes;
 mod shard;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -31,6 +32,7 @@ use crate::run::recipe;
 pub use codec::Chain;
 use codec::Codecs;
 pub use lock::Lock;
+pub(crate) use lock::is_lock;
 use mapped::MappedStorage;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
@@ -183,7 +185,7 @@ impl Store {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 // What a killed writer left of its first file is no obstacle.
                 let is_leftover = |entry: std::io::Result<std::fs::DirEntry>| {
-                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()) || lock::is_lock(&e.path()))
+                    entry.is_ok_and(|e| mapped::is_temporary(&e.path()) || is_lock(&e.path()))
                 };
                 let occupied =
                     std::fs::read_dir(&self.path).is_ok_and(|mut entries| !entries.all(is_leftover));
@@ -379,16 +381,33 @@ impl Store {
         }
     }
 
-    /// Reads a whole array of samples: its shape, the names of its channels, and the samples.
-    pub(crate) fn read_all_samples(&self, name: &str) -> Result<(Vec<usize>, Vec<String>, Samples)> {
+    /// Reads samples of a range along the first dimension: the array's shape, the names of its channels, and
+    /// the samples.
+    pub(crate) fn read_samples_of(
+        &self,
+        name: &str,
+        range: Range<u64>,
+    ) -> Result<(Vec<usize>, Vec<String>, Samples)> {
         let array = self.open_array(name)?;
         let sample_type = sample_type_of(&array).ok_or_else(|| {
             self.damaged(name, &format!("got elements of type {}, expected samples", array.data_type()))
         })?;
         let shape: Vec<usize> = array.shape().iter().map(|&n| n as usize).collect();
         let channels = channel_names(&array).map_err(|error| self.damaged(name, &error))?;
-        let samples = self.read_samples(&array, sample_type, &vec![0; shape.len()], array.shape())?;
+        let (mut start, mut extent) = (vec![0; shape.len()], array.shape().to_vec());
+        if let (Some(start), Some(extent)) = (start.first_mut(), extent.first_mut()) {
+            (*start, *extent) = (range.start, range.end.saturating_sub(range.start));
+        }
+        let samples = self.read_samples(&array, sample_type, &start, &extent)?;
         Ok((shape, channels, samples))
+    }
+
+    /// Extent of a chunk of an array along its first dimension.
+    pub(crate) fn chunk_rows(&self, name: &str) -> Result<usize> {
+        let array = self.open_array(name)?;
+        let chunk = array.chunk_shape(&vec![0; array.dimensionality()]);
+        let chunk = chunk.map_err(|error| self.damaged(name, &error))?;
+        Ok(chunk.first().map_or(1, |rows| rows.get() as usize))
     }
 
     /// Encodes and writes one chunk (or shard) of an array, all-zero ones too.

@@ -3,6 +3,7 @@
 //! Each stage (`tile`, `cluster`, `normals`, `fit`) writes its arrays and then, last, its entry in
 //! the attributes: arrays without their entry are the remains of a run that was killed.
 
+use std::ops::Range;
 use std::path::Path;
 
 use btfkit_formats::Samples;
@@ -285,18 +286,32 @@ impl Model {
 
     /// The measured colour BRDFs that stand for the clusters.
     pub fn representatives(&self) -> Result<Representatives> {
-        let (shape, channels, samples) = self.store.read_all_samples("representatives")?;
+        self.representatives_of(0..self.clusters()?)
+    }
+
+    /// Ranges of clusters whose representatives are decoded together: at most 16 MiB, unless one is larger.
+    pub fn representative_chunks(&self) -> Result<Vec<Range<usize>>> {
+        let clusters = self.clusters()?;
+        let rows = self.store.chunk_rows("representatives")?;
+        Ok((0..clusters).step_by(rows).map(|first| first..clusters.min(first + rows)).collect())
+    }
+
+    /// The measured colour BRDFs that stand for some of the clusters.
+    pub fn representatives_of(&self, clusters: Range<usize>) -> Result<Representatives> {
         let [views, lights] = self.directions()?;
+        let (found, channels, samples) =
+            self.store.read_samples_of("representatives", clusters.start as u64..clusters.end as u64)?;
         let expected = [self.clusters()?, views.len(), lights.len(), channels.len()];
-        if shape != expected || samples.is_empty() {
-            let found = format!("got shape {shape:?}, expected {expected:?} to fit the model");
+        if found != expected || samples.is_empty() {
+            let found = format!("got shape {found:?}, expected {expected:?} to fit the model");
             return Err(self.damaged("representatives", &found));
         }
         let report: Map<String, Value> = self.report(Stage::Tile)?;
         let transfer = report.get("transfer").cloned().unwrap_or_default();
         let transfer: Transfer = serde_json::from_value(transfer)
             .map_err(|error| Error::input(format!("{}: transfer: {error}", self.path().display())))?;
-        Ok(Representatives { shape: expected, channels, samples, transfer })
+        let shape = [clusters.len(), views.len(), lights.len(), channels.len()];
+        Ok(Representatives { shape, channels, samples, transfer })
     }
 
     /// Writes D of (26), [cluster, cluster], L* units.

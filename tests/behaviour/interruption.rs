@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::fixture::{assert_same, btf, enlarge, fail, fixture, succeed};
 
 /// Starts a command, waits until `ready`, and sends `signal`. Returns the exit code, none where it was killed.
-fn interrupt(command: &mut Command, signal: &str, ready: impl Fn() -> bool) -> Option<i32> {
+pub fn interrupt(command: &mut Command, signal: &str, ready: impl Fn() -> bool) -> Option<i32> {
     let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(60);
     while !ready() && child.try_wait().unwrap().is_none() {
@@ -18,7 +18,7 @@ fn interrupt(command: &mut Command, signal: &str, ready: impl Fn() -> bool) -> O
     child.wait().unwrap().code()
 }
 
-fn count(folder: &Path, part: &str) -> usize {
+pub fn count(folder: &Path, part: &str) -> usize {
     crate::fixture::tree_names(folder).iter().filter(|name| name.to_string_lossy().contains(part)).count()
 }
 

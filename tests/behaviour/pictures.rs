@@ -101,3 +101,80 @@ fn more_than_256_clusters_work_to_the_last_picture() {
         "the index must need 16 bits for this test to mean anything"
     );
 }
+
+/// Where the chunks of a shard of 4 x 4 chunks lie in it: an index of 16 pairs of u64 and a checksum end it.
+fn chunk_range(shard: &[u8], number: usize) -> std::ops::Range<usize> {
+    let index = &shard[shard.len() - 4 - 16 * 16..];
+    let [offset, length] =
+        [0, 8].map(|at| u64::from_le_bytes(index[16 * number + at..][..8].try_into().unwrap()) as usize);
+    offset..offset + length
+}
+
+#[test]
+fn a_window_reads_only_the_chunks_that_it_touches() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.zarr");
+    for (name, bytes) in crate::fixture::tree(&fixture().enlarged()) {
+        std::fs::create_dir_all(broken.join(&name).parent().unwrap()).unwrap();
+        std::fs::write(broken.join(name), bytes).unwrap();
+    }
+    let image = |source: &Path, window: &str, name: &str| {
+        let mut command = btf();
+        command.arg("image").arg(source).arg("--model").arg(fixture().model());
+        command.args(["--light", "20,45", "--window", window, "--out"]).arg(folder.path().join(name));
+        command
+    };
+    // Rows and columns 128 to 384 of the first shard alone.
+    let inner = "130,129,250,255";
+    for ending in ["png", "exr"] {
+        succeed(&mut image(&fixture().enlarged(), inner, &format!("whole.{ending}")));
+    }
+    // All other shards and the normals are gone, all other chunks of the first shard are wrecked.
+    for gone in ["index/c/0/1", "index/c/1/0", "index/c/1/1"] {
+        std::fs::remove_file(broken.join(gone)).unwrap();
+    }
+    std::fs::remove_dir_all(broken.join("normals/c")).unwrap();
+    let shard = broken.join("index/c/0/0");
+    let mut bytes = std::fs::read(&shard).unwrap();
+    for number in (0..16).filter(|number| ![5, 6, 9, 10].contains(number)) {
+        let range = chunk_range(&bytes, number);
+        bytes[range].fill(0xA5);
+    }
+    std::fs::write(&shard, bytes).unwrap();
+    for ending in ["png", "exr"] {
+        succeed(&mut image(&broken, inner, &format!("part.{ending}")));
+        let [whole, part] = ["whole", "part"]
+            .map(|name| std::fs::read(folder.path().join(format!("{name}.{ending}"))).unwrap());
+        assert!(whole == part, "{ending} differs");
+    }
+    let told = crate::fixture::fail(&mut image(&broken, "130,129,250,260", "damaged.png"), 65);
+    assert!(told.contains("index") && told.contains("damaged"), "{told}");
+    let told = crate::fixture::fail(&mut image(&broken, "500,490,20,50", "missing.png"), 66);
+    assert!(told.contains("shard [0, 1] has not been written"), "{told}");
+    for name in ["damaged.png", "missing.png"] {
+        assert!(!folder.path().join(name).exists());
+    }
+}
+
+#[test]
+fn the_memory_that_is_allowed_changes_no_byte_of_a_picture_and_too_little_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = |source: &Path, memory: &str, name: &str| {
+        let mut command = btf();
+        command.arg("image").arg(source).args(["--memory", memory, "--out"]).arg(folder.path().join(name));
+        command
+    };
+    for (number, source) in [fixture().enlarged(), fixture().measurement()].iter().enumerate() {
+        for ending in ["png", "exr"] {
+            let [little, much] = ["little", "much"].map(|name| format!("{name}-{number}.{ending}"));
+            succeed(&mut image(source, "16488KiB", &little));
+            succeed(&mut image(source, "1GiB", &much));
+            assert_eq!(
+                std::fs::read(folder.path().join(little)).unwrap(),
+                std::fs::read(folder.path().join(much)).unwrap()
+            );
+        }
+    }
+    let told = crate::fixture::fail(&mut image(&fixture().enlarged(), "16388KiB", "none.png"), 2);
+    assert!(told.contains("--memory"), "{told}");
+}

@@ -1,0 +1,106 @@
+//! Picture files written row by row, so that a picture may be larger than memory.
+
+use std::fs::File;
+use std::io::{BufWriter, Seek, Write};
+use std::path::Path;
+
+use exr::block::writer::ChunksWriter;
+use exr::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
+use exr::meta::BlockDescription;
+use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
+use exr::meta::header::Header;
+
+use crate::error::{Error, Result};
+use crate::picture::{Ending, Meaning};
+use crate::shape::Size;
+use crate::store::output::write_whole;
+
+/// Bytes of compressed pixels that are written at once.
+const PIECE_BYTES: usize = 64 << 10;
+
+/// Writes a PNG or an EXR file, by the ending of its name, from rows that `row` gives from the top down;
+/// it appears whole or not at all.
+///
+/// # Errors
+/// Those of `row` and of writing.
+pub fn write(
+    path: &Path,
+    size: Size,
+    meaning: Meaning,
+    row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
+) -> Result<()> {
+    let ending = Ending::of(path)?;
+    write_whole(path, |output: &mut BufWriter<File>| match ending {
+        Ending::Png => png(output, size, meaning, row),
+        Ending::Exr => exr(output, size, row),
+    })
+}
+
+/// A PNG of display values.
+fn png(
+    output: impl Write,
+    size: Size,
+    meaning: Meaning,
+    mut row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
+) -> Result<()> {
+    let mut writer = png_header(output, size)?;
+    let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(|error| png_failed(&error))?;
+    let mut pixels = vec![[0.0; 3]; size.width];
+    let mut bytes = vec![0; 3 * size.width];
+    for _ in 0..size.height {
+        row(&mut pixels)?;
+        meaning.encode(&pixels, &mut bytes);
+        stream.write_all(&bytes).map_err(|error| png_failed(&error))?;
+    }
+    stream.finish().map_err(|error| png_failed(&error))?;
+    writer.finish().map_err(|error| png_failed(&error))
+}
+
+/// Begins a PNG of 8-bit sRGB values.
+pub(super) fn png_header<W: Write>(output: W, size: Size) -> Result<png::Writer<W>> {
+    let side = |texels: usize| u32::try_from(texels).unwrap_or(0);
+    let mut encoder = png::Encoder::new(output, side(size.width), side(size.height));
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.write_header().map_err(|error| png_failed(&error))
+}
+
+/// An error of writing a PNG.
+pub(super) fn png_failed(error: &dyn std::fmt::Display) -> Error {
+    Error::internal(format!("cannot encode a PNG: {error}"))
+}
+
+/// An EXR of the values as 32-bit floats, a row a block.
+pub(super) fn exr(
+    output: impl Write + Seek,
+    size: Size,
+    mut row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
+) -> Result<()> {
+    let channels = ["B", "G", "R"].map(|name| ChannelDescription::named(name, SampleType::F32));
+    let header = Header::new(Text::default(), (size.width, size.height), channels.into_iter().collect())
+        .with_encoding(
+            exr::compression::Compression::RLE,
+            BlockDescription::ScanLines,
+            LineOrder::Increasing,
+        );
+    let mut pixels = vec![[0.0f32; 3]; size.width];
+    let mut failed = None;
+    let written = exr::block::write(output, [header].into_iter().collect(), true, |meta, file| {
+        let mut file = file.sequential_blocks_compressor(&meta);
+        for (number, index) in enumerate_ordered_header_block_indices(&meta.headers) {
+            if let Err(error) = row(&mut pixels) {
+                failed = Some(error);
+                return Err(exr::error::Error::Aborted);
+            }
+            let channel = |c: usize| pixels.iter().flat_map(move |pixel| pixel[c].to_ne_bytes());
+            let data = [2, 1, 0].into_iter().flat_map(channel).collect();
+            file.compress_block(number, UncompressedBlock { index, data })?;
+        }
+        Ok(())
+    });
+    match (failed, written) {
+        (Some(error), _) => Err(error),
+        (None, written) => written.map_err(|error| Error::internal(format!("cannot encode an EXR: {error}"))),
+    }
+}

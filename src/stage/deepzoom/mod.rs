@@ -1,0 +1,266 @@
+//! A picture of any size as a Deep Zoom pyramid of small tiles, which viewers in a browser open.
+//!
+//! Rows stream from the source through all levels at once ([`cascade`]); tiles are encoded by all threads as soon as
+//! their rows are there. A run that goes on after an interruption runs the rows through again, but encodes
+//! only tiles that are missing.
+
+mod cascade;
+mod page;
+mod place;
+pub mod pyramid;
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use btfkit_formats::{Direction, jpeg};
+use rayon::prelude::*;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::error::{Error, Result};
+use crate::picture;
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
+use crate::shape::Size;
+use crate::stage::image::{self, Scene, Subject};
+use crate::store::mapped::write_file;
+use cascade::{Cascade, Sink};
+use place::Place;
+use pyramid::Pyramid;
+
+/// Sides of a tile that are allowed.
+pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
+
+/// Memory for what does not grow with the picture: the program itself, threads, packers.
+const FIXED_BYTES: u64 = 16 << 20;
+
+/// Format of the tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// Lossless.
+    Png,
+    /// Lossy, of a quality from 1 to 100.
+    Jpeg(u8),
+}
+
+impl Encoding {
+    /// Ending of the names of tiles.
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpeg(_) => "jpg",
+        }
+    }
+
+    fn recipe(self) -> Value {
+        match self {
+            Self::Png => json!("png"),
+            Self::Jpeg(quality) => json!({"jpeg": quality}),
+        }
+    }
+
+    /// The file of 8-bit pixels.
+    fn encode(self, size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
+        match self {
+            Self::Png => picture::png(size, pixels),
+            Self::Jpeg(quality) => {
+                let options = jpeg::EncodeOptions { quality, progressive: false, chroma: jpeg::Chroma::Half };
+                Ok(jpeg::encode(pixels, size.width as u32, size.height as u32, 3, &options)?)
+            }
+        }
+    }
+}
+
+/// What to show, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// A measurement, a model (its tile) or an enlarged index.
+    pub source: PathBuf,
+    /// The model of an enlarged index; beside it under its recorded name where absent.
+    pub model: Option<PathBuf>,
+    /// Where it is seen from.
+    pub view: Direction,
+    /// Where it is lit from.
+    pub light: Direction,
+    /// Factor on the linear values.
+    pub exposure: f64,
+    /// The description to make, `NAME.dzi`; the tiles come into `NAME_files`, a viewer is `NAME.html`.
+    pub output: PathBuf,
+    /// Format of the tiles.
+    pub encoding: Encoding,
+    /// Side of a tile without its overlap, within [`TILE_SIDES`].
+    pub tile_side: usize,
+    /// Pixels of its neighbours that a tile holds; at most half its side.
+    pub overlap: usize,
+}
+
+/// A pyramid, ready to be made.
+pub struct Plan {
+    scene: Scene,
+    pyramid: Pyramid,
+    encoding: Encoding,
+    place: Place,
+    recipe: Value,
+}
+
+/// How it went.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Width and height of the picture.
+    pub size: [usize; 2],
+    /// Number of levels.
+    pub levels: u32,
+    /// Tiles found done.
+    pub tiles_found: u64,
+    /// Tiles written by this run.
+    pub tiles_written: u64,
+}
+
+/// Opens the source and checks that the place is free, or holds what the same recipe began.
+///
+/// # Errors
+/// Settings beyond their ranges, a source that cannot be pictured, and a place that is taken.
+pub fn plan(options: &Options) -> Result<Plan> {
+    let (side, overlap) = (options.tile_side, options.overlap);
+    if !TILE_SIDES.contains(&side) || overlap > side / 2 {
+        return Err(Error::usage(format!(
+            "got tiles of {side} with an overlap of {overlap}, expected {} to {} and at most half of it",
+            TILE_SIDES.start(),
+            TILE_SIDES.end()
+        )));
+    }
+    let place = Place::new(&options.output, options.encoding)?;
+    let mut scene = Scene::open(&image::Options {
+        source: options.source.clone(),
+        model: options.model.clone(),
+        subject: Subject::Appearance { view: options.view, light: options.light },
+        window: None,
+    })?;
+    scene.expose(options.exposure);
+    let direction = |direction: Direction| json!(direction.degrees());
+    let recipe = json!({
+        "stage": "deepzoom", "method": METHOD,
+        "source": scene.recipe(),
+        "view": direction(options.view),
+        "light": direction(options.light),
+        "exposure": options.exposure,
+        "tiles": options.encoding.recipe(),
+        "tile_side": side,
+        "overlap": overlap,
+    });
+    place.check(&recipe)?;
+    let pyramid = Pyramid { size: scene.size(), side, overlap };
+    Ok(Plan { scene, pyramid, encoding: options.encoding, place, recipe })
+}
+
+impl Plan {
+    /// What would be done.
+    pub fn summary(&self, context: &Context<'_>) -> Value {
+        json!({
+            "stage": "deepzoom",
+            "output": self.place.description,
+            "units": self.pyramid.tiles(),
+            "unit": "tile",
+            "levels": self.pyramid.top() + 1,
+            "memory_bytes": self.memory_bytes(context),
+            "recipe": self.recipe,
+        })
+    }
+
+    /// Memory of the levels, a row of the source and the tiles in work; bands of the source come on top of it.
+    fn memory_bytes(&self, context: &Context<'_>) -> u64 {
+        let tile = 3 * (self.pyramid.side + 2 * self.pyramid.overlap).pow(2) as u64;
+        // Pixels, filtered or transformed pixels, and the file.
+        let row = (self.pyramid.size.width * size_of::<[f32; 3]>()) as u64;
+        FIXED_BYTES + Cascade::memory_bytes(&self.pyramid) + row + context.threads as u64 * 4 * tile
+    }
+
+    /// Makes the tiles that are not there yet, then the page and the description.
+    ///
+    /// # Errors
+    /// A picture too wide for the memory that is allowed, and those of reading and writing.
+    pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let window = self.pyramid.size.window();
+        let needed = self.memory_bytes(context);
+        let left = context.memory_bytes.saturating_sub(needed);
+        let bands = self.scene.bands(window, left).map_err(|_| {
+            Error::usage(format!(
+                "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
+                window.size.width,
+                needed >> 20,
+                context.memory_bytes >> 20
+            ))
+            .hint("allow a larger --memory, or make smaller tiles by --tile-size")
+        })?;
+        self.place.begin(&self.recipe)?;
+        let total = self.pyramid.tiles();
+        context.progress.begin("deepzoom", total, Counted::Items("tiles"));
+        let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };
+        if !self.is_whole() {
+            let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
+            let mut pixels = vec![[0.0; 3]; window.size.width];
+            for part in bands {
+                context.check_stop()?;
+                let band = self.scene.read(part, context)?;
+                for row in 0..part.size.height {
+                    band.row(row, &mut pixels);
+                    cascade.push(&self.pyramid, &pixels, &tiles)?;
+                }
+            }
+        } else {
+            tiles.found.store(total, Ordering::Relaxed);
+        }
+        self.place
+            .write_beside(&self.place.page, &page::viewer(&self.pyramid, self.encoding, &self.place.name)?)?;
+        self.place.write_beside(&self.place.description, &page::description(&self.pyramid, self.encoding))?;
+        context.progress.end();
+        let found = tiles.found.into_inner();
+        Ok(Report {
+            size: [window.size.width, window.size.height],
+            levels: self.pyramid.top() + 1,
+            tiles_found: found,
+            tiles_written: total - found,
+        })
+    }
+
+    /// Whether every tile is there.
+    fn is_whole(&self) -> bool {
+        (0..=self.pyramid.top()).all(|level| {
+            let grid = self.pyramid.grid(self.pyramid.level(level));
+            (0..grid.texels()).all(|n| self.place.tile(level, n / grid.width, n % grid.width).is_file())
+        })
+    }
+}
+
+/// Cuts rows into tiles and writes those that are missing.
+struct Tiles<'a> {
+    plan: &'a Plan,
+    context: &'a Context<'a>,
+    found: AtomicU64,
+}
+
+impl Sink for Tiles<'_> {
+    fn tile_row(&self, level: u32, tile_row: usize, rows: &[u8]) -> Result<()> {
+        let pyramid = &self.plan.pyramid;
+        let size = pyramid.level(level);
+        let columns = pyramid.grid(size).width;
+        self.context.install(|| {
+            (0..columns).into_par_iter().try_for_each(|column| {
+                self.context.check_stop()?;
+                let path = self.plan.place.tile(level, tile_row, column);
+                if path.is_file() {
+                    self.found.fetch_add(1, Ordering::Relaxed);
+                } else {
+                    let tile = pyramid.tile(size, tile_row, column);
+                    let columns = 3 * tile.x..3 * (tile.x + tile.size.width);
+                    let rows = rows.chunks_exact(3 * size.width);
+                    let pixels: Vec<u8> = rows.flat_map(|row| &row[columns.clone()]).copied().collect();
+                    write_file(&path, &self.plan.encoding.encode(tile.size, &pixels)?)?;
+                }
+                self.context.progress.advance(1);
+                Ok(())
+            })
+        })
+    }
+}

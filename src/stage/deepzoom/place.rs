@@ -1,0 +1,114 @@
+//! Where a pyramid lies: `NAME.dzi`, `NAME.html`, and the tiles in `NAME_files`.
+//!
+//! `NAME_files/btfkit.json` holds the recipe and is written first; `NAME.dzi` is written last, so that it is there
+//! only once all tiles are. Every file appears whole or not at all: a tile that is there is done.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+
+use super::Encoding;
+use crate::error::{Error, Result};
+use crate::run::recipe;
+use crate::store::mapped::{self, MappedStorage, write_file};
+use crate::store::{Store, is_lock};
+
+/// Name of the file with the recipe.
+const STATE: &str = "btfkit.json";
+
+/// Ending of the name of the folder of tiles: what viewers expect.
+const FOLDER_ENDING: &str = "_files";
+
+/// The files of a pyramid.
+pub(super) struct Place {
+    /// The description, `NAME.dzi`.
+    pub(super) description: PathBuf,
+    /// The viewer, `NAME.html`.
+    pub(super) page: PathBuf,
+    /// `NAME`, as the files bear it.
+    pub(super) name: String,
+    folder: PathBuf,
+    ending: &'static str,
+}
+
+impl Place {
+    /// The place of a pyramid whose description is called `output`.
+    pub(super) fn new(output: &Path, encoding: Encoding) -> Result<Self> {
+        let ends = output.extension().is_some_and(|ending| ending == "dzi");
+        let name = output.file_stem().and_then(|name| name.to_str()).filter(|_| ends).ok_or_else(|| {
+            Error::usage(format!("{}: expected a name that ends in .dzi", output.display()))
+        })?;
+        Ok(Self {
+            description: output.to_owned(),
+            page: output.with_extension("html"),
+            name: name.to_owned(),
+            folder: output.with_file_name(format!("{name}{FOLDER_ENDING}")),
+            ending: encoding.ending(),
+        })
+    }
+
+    /// The file of a tile.
+    pub(super) fn tile(&self, level: u32, row: usize, column: usize) -> PathBuf {
+        self.folder.join(level.to_string()).join(format!("{column}_{row}.{}", self.ending))
+    }
+
+    /// Checks that nothing lies there, or what the same recipe began.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Recipe`] for another recipe's pyramid, [`crate::Kind::Input`] for other files.
+    pub(super) fn check(&self, recipe: &Value) -> Result<()> {
+        let path = self.folder.join(STATE);
+        match std::fs::read(&path) {
+            Ok(text) => {
+                let found: Map<String, Value> = serde_json::from_slice(&text)
+                    .map_err(|error| Error::input(format!("{}: {error}", path.display())))?;
+                return recipe::expect_same(&self.description, &found, recipe);
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => return Err(Error::io("read", &path, error)),
+        }
+        let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry.is_ok_and(|entry| mapped::is_temporary(&entry.path()) || is_lock(&entry.path()))
+        };
+        let strange = std::fs::read_dir(&self.folder).is_ok_and(|mut entries| !entries.all(is_ours));
+        let occupied = [(&self.folder, strange || self.folder.is_file())]
+            .into_iter()
+            .chain([&self.description, &self.page].map(|path| (path, path.exists())))
+            .find(|(_, occupied)| *occupied);
+        match occupied {
+            Some((path, _)) => {
+                Err(Error::input(format!("{} exists and is not of a pyramid begun here", path.display()))
+                    .hint("choose another name, or delete it"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Writes the recipe, unless it is there, and removes what killed writers left.
+    pub(super) fn begin(&self, recipe: &Value) -> Result<()> {
+        // Looked at before the lock, which leaves a file: none in a folder that is not ours.
+        self.check(recipe)?;
+        let _lock = Store::at(&self.folder).lock("")?;
+        self.check(recipe)?;
+        MappedStorage::new(&self.folder).sweep()?;
+        let path = self.folder.join(STATE);
+        if path.exists() {
+            return Ok(());
+        }
+        let state = json!({
+            "kind": "deepzoom", "version": env!("CARGO_PKG_VERSION"),
+            "recipe": recipe, "digest": recipe::digest(recipe),
+        });
+        let text = serde_json::to_vec_pretty(&state).map_err(|error| Error::internal(error.to_string()))?;
+        write_file(&path, &text)
+    }
+
+    /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.
+    pub(super) fn write_beside(&self, path: &Path, text: &str) -> Result<()> {
+        let name = path.file_name().unwrap_or_default();
+        let temporary = mapped::temporary_name(&self.folder.join(name));
+        std::fs::write(&temporary, text)
+            .and_then(|()| mapped::publish(&temporary, path))
+            .map_err(|error| Error::io("write", path, error))
+    }
+}

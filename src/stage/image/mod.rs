@@ -1,0 +1,185 @@
+//! Planar pictures of a measurement, a tile or an enlarged index under any light and view, (27).
+
+mod scene;
+
+use std::path::{Path, PathBuf};
+
+use crate::color::Decoder;
+use crate::error::{Error, Result};
+use crate::picture::{Ending, Picture, stream};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::shape::{Size, Window};
+use crate::store::measurement::Measurement;
+use crate::store::model::Model;
+use crate::texel::evaluate::{Appearance, add};
+use crate::texel::tile::Tile;
+use crate::texel::triangulation::{Interpolator, triangulate};
+use btfkit_formats::Direction;
+use scene::MEASUREMENT_ROWS;
+pub use scene::{Band, Scene};
+
+/// Memory for what does not grow with a picture: the program itself, packers, buffers.
+const WRITING_BYTES: u64 = 16 << 20;
+
+/// What to show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Subject {
+    /// The material under a light, seen from a view.
+    Appearance {
+        /// Where it is seen from.
+        view: Direction,
+        /// Where it is lit from.
+        light: Direction,
+    },
+    /// Cluster numbers in false colours.
+    Index,
+    /// The normal map.
+    Normals,
+}
+
+/// What to picture.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// A measurement, a model (its tile) or an enlarged index.
+    pub source: PathBuf,
+    /// The model of an enlarged index; beside it under its recorded name where absent.
+    pub model: Option<PathBuf>,
+    /// What to show.
+    pub subject: Subject,
+    /// The part to show; all of it where absent.
+    pub window: Option<Window>,
+}
+
+/// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
+/// with its width only. Returns its size.
+///
+/// # Errors
+/// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
+pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<Size> {
+    Ending::of(output)?;
+    let mut scene = Scene::open(options)?;
+    scene.expose(exposure);
+    let plane = scene.size();
+    let window = options.window.unwrap_or(plane.window());
+    if !window.fits(plane) {
+        return Err(Error::usage(format!("window {window} does not lie within {plane}")));
+    }
+    // Rows as values, bytes and packed bytes, and the file's buffers.
+    let writing = 32 * window.size.width as u64 + WRITING_BYTES;
+    let mut bands = scene.bands(window, context.memory_bytes.saturating_sub(writing))?;
+    context.progress.begin("image", window.size.height as u64, Counted::Items("rows"));
+    let mut band: Option<(usize, usize, Band<'_>)> = None;
+    stream::write(output, window.size, scene.meaning(), |pixels| {
+        let (next, rows, read) = match band.take() {
+            Some(band) if band.0 < band.1 => band,
+            _ => {
+                context.check_stop()?;
+                let window = bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
+                (0, window.size.height, scene.read(window, context)?)
+            }
+        };
+        read.row(next, pixels);
+        band = Some((next + 1, rows, read));
+        context.progress.advance(1);
+        Ok(())
+    })?;
+    context.progress.end();
+    Ok(window.size)
+}
+
+/// The measurement itself, mixed between measured directions.
+pub fn of_measurement(
+    measurement: &Measurement,
+    view: Direction,
+    light: Direction,
+    window: Window,
+    context: &Context<'_>,
+) -> Result<Picture> {
+    let appearance = measured_appearance(measurement, view, light);
+    let decoder = measurement.description().decoder()?;
+    Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, context)?))
+}
+
+/// How a measurement is mixed under a light, seen from a view.
+fn measured_appearance(measurement: &Measurement, view: Direction, light: Direction) -> Appearance {
+    let description = measurement.description();
+    let [views, lights] =
+        [&description.views, &description.lights].map(|d| Interpolator::new(d, &triangulate(d)));
+    Appearance::new(&views, &lights, view, light)
+}
+
+fn mixed(
+    measurement: &Measurement,
+    appearance: &Appearance,
+    decoder: &Decoder,
+    window: Window,
+    context: &Context<'_>,
+) -> Result<Vec<[f32; 3]>> {
+    let description = measurement.description();
+    let (texel, channels) = (description.texel_samples(), description.n_channels());
+    let mut pixels = vec![[0.0f64; 3]; window.size.texels()];
+    let mut wanted: Vec<usize> = appearance.terms.iter().map(|&(view, ..)| view).collect();
+    wanted.dedup();
+    for view in wanted {
+        for top in (0..window.size.height).step_by(MEASUREMENT_ROWS) {
+            context.check_stop()?;
+            let rows = MEASUREMENT_ROWS.min(window.size.height - top);
+            let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
+            let samples = measurement.read_reflectance(view, band)?;
+            let to = &mut pixels[top * window.size.width..];
+            for (at, sum) in (0..samples.len()).step_by(texel).zip(to) {
+                for &(_, light, weight) in appearance.terms.iter().filter(|(v, ..)| *v == view) {
+                    add(sum, weight, decoder.rgb(&samples, at + light * channels));
+                }
+            }
+        }
+    }
+    Ok(pixels.into_iter().map(|p| p.map(|value| value as f32)).collect())
+}
+
+/// Measured values of the texels of a tile.
+pub fn of_measured_tile(
+    measurement: &Measurement,
+    tile: &Tile,
+    view: Direction,
+    light: Direction,
+    context: &Context<'_>,
+) -> Result<Picture> {
+    let bounds = of_measurement(measurement, view, light, tile.bounds(), context)?;
+    let pixels = tile.offsets_in_bounds().into_iter().map(|at| bounds.pixels[at]).collect();
+    Ok(Picture::linear(tile.size, pixels))
+}
+
+/// Linear RGB of every cluster of a model under a light, seen from a view.
+pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Result<Vec<[f32; 3]>> {
+    let [views, lights] = model.directions()?;
+    let [view_triangles, light_triangles] = model.triangles()?;
+    let (views, lights) =
+        (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
+    let appearance = Appearance::new(&views, &lights, view, light);
+    let mut colors = Vec::new();
+    for clusters in model.representative_chunks()? {
+        let representatives = model.representatives_of(clusters)?;
+        let decoder = representatives.decoder()?;
+        colors.extend(appearance.of_brdfs(&representatives.samples, representatives.shape, &decoder));
+    }
+    Ok(colors)
+}
+
+/// Looks up the colour of each texel's cluster.
+pub fn look_up(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Result<Picture> {
+    expect_colors(index, colors)?;
+    Ok(Picture::linear(size, index.iter().map(|&cluster| colors[usize::from(cluster)]).collect()))
+}
+
+/// Checks that every cluster has a colour.
+fn expect_colors(index: &[u16], colors: &[[f32; 3]]) -> Result<()> {
+    match index.iter().max() {
+        Some(&cluster) if usize::from(cluster) >= colors.len() => Err(Error::input(format!(
+            "the index refers to cluster {cluster}, beyond the {} of the model",
+            colors.len()
+        ))),
+        _ => Ok(()),
+    }
+}

@@ -26,7 +26,7 @@ const PLACE_BITS: u32 = 23;
 const TOGETHER: usize = 8;
 
 /// Bytes of tables and candidates after which no more are made.
-const ENOUGH_BYTES: usize = 32 << 20;
+const ENOUGH_BYTES: usize = 64 << 20;
 
 /// Tables and candidates.
 pub(super) struct Leaves {

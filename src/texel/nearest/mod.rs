@@ -8,15 +8,21 @@ mod leaves;
 mod search;
 mod square;
 pub mod tree;
+mod twins;
 
 use self::leaves::Leaves;
 use self::search::Search;
 use self::tree::{Neighbour, Tree};
+use self::twins::Twins;
 use crate::kernel::Kernel;
 use crate::kernel::ranking::{BATCH, RANKS};
 
 /// Normals of a tile, ready to be searched.
 pub struct NearestNormals {
+    twins: Twins,
+    /// Whether there are texels of equal normals at all.
+    has_twins: bool,
+    /// Over the distinct normals.
     tree: Tree,
     /// None if more neighbours are wanted than can be ranked.
     leaves: Option<Leaves>,
@@ -28,17 +34,29 @@ impl NearestNormals {
     /// Over the normals of a tile, whose order gives the texel numbers, for the `count` nearest. Works in parallel;
     /// what is found depends on neither threads nor kernel.
     pub fn new(normals: &[[f32; 3]], count: usize, kernel: Kernel) -> Self {
-        let points = distinct(normals, count);
+        let twins = Twins::new(normals, count);
+        let points: Vec<_> = twins.normals.iter().copied().zip(0..).collect();
         let tree = Tree::new(points.clone());
         let leaves = (1..=RANKS)
             .contains(&count)
-            .then(|| Leaves::new(&points, &Search { normals, tree: &tree, count, kernel }));
-        Self { tree, leaves, count, kernel }
+            .then(|| Leaves::new(&points, &Search { normals: &twins.normals, tree: &tree, count, kernel }));
+        Self { has_twins: !twins.are_none(), twins, tree, leaves, count, kernel }
     }
 
     /// Finds the nearest normals of each query: `found` is [query, rank], texel numbers, nearest first. There must be
     /// as many normals as ranks.
     pub fn find_row(&self, queries: &[[f32; 3]], found: &mut [u32]) {
+        self.find_distinct(queries, found);
+        if self.has_twins && self.count > 0 {
+            let mut buffer = Vec::new();
+            for (&query, found) in queries.iter().zip(found.chunks_exact_mut(self.count)) {
+                self.twins.tell_apart(query, found, &mut buffer);
+            }
+        }
+    }
+
+    /// The same by the numbers of distinct normals.
+    fn find_distinct(&self, queries: &[[f32; 3]], found: &mut [u32]) {
         let (batches, rest) = queries.as_chunks::<BATCH>();
         let Some(leaves) = self.leaves.as_ref().filter(|_| !batches.is_empty()) else {
             return self.find_by_tree(queries, found);
@@ -91,22 +109,10 @@ impl NearestNormals {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + self.leaves.as_ref().map_or(0, Leaves::memory_bytes)
+        self.twins.memory_bytes()
+            + self.tree.memory_bytes()
+            + self.leaves.as_ref().map_or(0, Leaves::memory_bytes)
     }
-}
-
-/// The normals with their texel numbers, without those that can never be found since `count` equal ones precede them.
-fn distinct(normals: &[[f32; 3]], count: usize) -> Vec<([f32; 3], u32)> {
-    let bits = |texel: u32| normals[texel as usize].map(f32::to_bits);
-    let mut texels: Vec<u32> = (0..normals.len() as u32).collect();
-    texels.sort_unstable_by_key(|&texel| (bits(texel), texel));
-    let mut kept: Vec<u32> = texels
-        .chunk_by(|&a, &b| bits(a) == bits(b))
-        .flat_map(|equal| &equal[..equal.len().min(count)])
-        .copied()
-        .collect();
-    kept.sort_unstable();
-    kept.into_iter().map(|texel| (normals[texel as usize], texel)).collect()
 }
 
 #[cfg(test)]

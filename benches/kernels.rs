@@ -7,7 +7,7 @@ use btfkit::color::{LightnessCodes, Transfer};
 use btfkit::kernel::Kernel;
 use btfkit::kernel::counting::{STRIP, lower_medians};
 use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
-use btfkit::mrf::{Boundary, Extent, Field, Kind, Options, Synthesis, fit};
+use btfkit::mrf::{Boundary, Extent, Field, Gains, Kind, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit::texel::cluster::points::Arrangement;
 use btfkit_formats::{Direction, SampleType, Samples};
@@ -161,7 +161,7 @@ fn synthesis(bencher: Bencher<'_, '_>, kind: Kind) {
     let smooth =
         (0..noise.len()).map(|n| (0..5).map(|k| noise[(n + k * 195) % noise.len()]).sum::<f64>() / 5.0);
     let field = Field::new(64, 64, 3, smooth.collect()).expect("64 x 64 x 3 samples");
-    let options = Options { kind, levels: Some(3), boundary: Boundary::Periodic };
+    let options = Options { kind, levels: Some(3), gains: Gains::None, boundary: Boundary::Periodic };
     let model = fit(&field, &options).expect("a field that can be fitted");
     let mut row = vec![0.0; 1024 * 3];
     bencher

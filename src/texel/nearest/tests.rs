@@ -1,3 +1,4 @@
+#![allow(clippy::unwrap_used)]
 use super::tree::squared_distance;
 use super::*;
 use crate::random::Hash;

@@ -130,7 +130,7 @@ impl Synthesis {
     ///
     /// # Errors
     /// When fewer rows are left.
-    pub fn skip_rows(&mut self, count: usize) -> Result<()> {
+    fn skip_rows(&mut self, count: usize) -> Result<()> {
         if count > self.height - self.position {
             return Err(Error::internal(format!(
                 "row {} + {count} of a field of {} rows",

@@ -28,10 +28,6 @@ use pipeline::{Band, Chooser, Pipeline, Source};
 /// are soon all at work, and a band is still in a cache when the next station takes it.
 const BAND_BYTES: usize = 2 << 20;
 
-/// Most bytes of the table that nearest normals are looked up in, and those that a texel of the tile takes beside it.
-const LOOK_UP_BYTES: usize = 32 << 20;
-const TREE_BYTES: usize = 64;
-
 /// Bands on their way at a time.
 const BANDS: usize = 3;
 
@@ -185,8 +181,7 @@ impl Plan {
         let bands = BANDS * self.band_rows() * Band::row_bytes(size.width, candidates);
         let texel_bytes = size_of::<u16>() + if keep_normals { size_of::<[f32; 3]>() } else { 0 };
         let shards = SHARD_SIDE.min(size.height) * size.width * texel_bytes;
-        let tile = LOOK_UP_BYTES
-            + self.tile.texels() * TREE_BYTES
+        let tile = NearestNormals::most_bytes(self.tile.texels())
             + self.clusters.clusters * self.clusters.clusters * size_of::<f32>();
         (bands + shards + tile) as u64 + self.field_bytes
     }

@@ -28,6 +28,9 @@ const TOGETHER: usize = 8;
 /// Bytes of tables and candidates after which no more are made.
 const ENOUGH_BYTES: usize = 64 << 20;
 
+/// Most bytes: the last squares begun with may exceed what is enough.
+pub(super) const MOST_BYTES: usize = 80 << 20;
+
 /// Tables and candidates.
 pub(super) struct Leaves {
     cells: Vec<Cell>,

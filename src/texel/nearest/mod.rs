@@ -17,6 +17,9 @@ use self::twins::Twins;
 use crate::kernel::Kernel;
 use crate::kernel::ranking::{BATCH, RANKS};
 
+/// Bytes of twins and tree for each texel, at most.
+const TEXEL_BYTES: usize = 64;
+
 /// Normals of a tile, ready to be searched.
 pub struct NearestNormals {
     twins: Twins,
@@ -105,6 +108,11 @@ impl NearestNormals {
     pub fn candidates(&self, query: [f32; 3]) -> Option<usize> {
         let candidates = self.leaves.as_ref()?.find(&[query; BATCH])[0].len();
         (candidates > 0).then_some(candidates)
+    }
+
+    /// What [`Self::memory_bytes`] of a tile of so many texels is at most.
+    pub fn most_bytes(texels: usize) -> usize {
+        leaves::MOST_BYTES + texels * TEXEL_BYTES
     }
 
     /// Bytes held.

@@ -34,6 +34,7 @@ fn check(normals: &[[f32; 3]], queries: &[[f32; 3]], count: usize) -> f64 {
     let mut share = 0.0;
     for kernel in Kernel::available() {
         let nearest = NearestNormals::new(normals, count, kernel);
+        assert!(nearest.memory_bytes() <= NearestNormals::most_bytes(normals.len()));
         let mut found = vec![7; queries.len() * count];
         nearest.find_row(queries, &mut found);
         for (&query, found) in queries.iter().zip(found.chunks_exact(count)) {

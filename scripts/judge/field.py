@@ -185,6 +185,6 @@ def field(report, store):
         check_level(report, store, k, fit["levels"][k], band, flat, wraps)
     told = store.read("mrf/covariance")
     expected = matrix.T @ covariance(store, len(fit["levels"]), flat) @ matrix
-    report.at_most("covariance of a synthesis", relative(told, expected), 0.02)
+    report.at_most("covariance of a synthesis", relative(told, expected), 1e-3)
     if fit["marginals"]:
         marginals(report, store, normals, told, fit["marginals"])

@@ -158,6 +158,7 @@ impl Model {
         let entry = self.stage(stage)?.unwrap_or_default();
         serde_json::from_value(entry.get("report").cloned().unwrap_or_default()).map_err(|error| {
             Error::input(format!("{}: report of {}: {error}", self.path().display(), stage.name()))
+                .hint("if another version of the program made this model, make it anew")
         })
     }
 

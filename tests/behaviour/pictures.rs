@@ -178,3 +178,27 @@ fn the_memory_that_is_allowed_changes_no_byte_of_a_picture_and_too_little_is_ref
     let told = crate::fixture::fail(&mut image(&fixture().enlarged(), "16388KiB", "none.png"), 2);
     assert!(told.contains("--memory"), "{told}");
 }
+
+/// The figures that `btf fit --report` tells are those of the normals: the tile's spread, worked out again.
+#[test]
+fn the_report_of_a_fit_is_a_table_and_a_sheet() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join("field");
+    let told = succeed(btf().arg("fit").arg(fixture().model()).arg("--report").arg(&name));
+    let text = std::fs::read_to_string(folder.path().join("field.txt")).unwrap();
+    assert!(told.contains(text.trim_end()), "{told}");
+    let normals = Model::open(&fixture().model()).unwrap().normals().unwrap();
+    for (axis, component) in ["n_x", "n_y", "n_z"].iter().enumerate() {
+        let values = normals.iter().map(|n| f64::from(n[axis]));
+        let mean = values.clone().sum::<f64>() / normals.len() as f64;
+        let spread = (values.map(|v| (v - mean).powi(2)).sum::<f64>() / normals.len() as f64).sqrt();
+        let line = text.lines().find(|line| line.starts_with(component)).unwrap();
+        let cells: Vec<f64> = line.split_whitespace().skip(1).map(|cell| cell.parse().unwrap()).collect();
+        let [_, _, tile, synthesis, ..] = cells[..] else { panic!("{line}") };
+        assert!((tile - spread).abs() < 6e-4, "{component}: {tile} for {spread}");
+        assert!((synthesis - spread).abs() < 0.25 * spread, "{component}: {synthesis} for {spread}");
+    }
+    let sheet = std::io::BufReader::new(std::fs::File::open(folder.path().join("field.png")).unwrap());
+    let reader = png::Decoder::new(sheet).read_info().unwrap();
+    assert_eq!((reader.info().width, reader.info().height), (1120, 920));
+}

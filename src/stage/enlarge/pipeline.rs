@@ -152,10 +152,11 @@ impl<'a> Pipeline<'a> {
     pub(super) fn step(&mut self) -> Result<Option<(usize, Option<ShardRow>)>> {
         let Self { source, nearest, chooser, candidates, made, sought, spare } = self;
         let (mut filled, mut completed) = (Ok(()), None);
+        // The two that are serial begin at once, each on a thread; the search, which all threads share, fills the rest.
         rayon::scope(|scope| {
             scope.spawn(|_| filled = source.fill(spare));
-            scope.spawn(|_| completed = chooser.take(sought, *candidates));
-            seek(nearest, made, *candidates);
+            scope.spawn(|_| seek(nearest, made, *candidates));
+            completed = chooser.take(sought, *candidates);
         });
         filled?;
         let chosen = sought.rows;
@@ -165,7 +166,6 @@ impl<'a> Pipeline<'a> {
         // spare -> made -> sought -> spare
         std::mem::swap(sought, spare);
         std::mem::swap(sought, made);
-        spare.candidates.clear();
         Ok(Some((chosen, completed)))
     }
 }

@@ -4,13 +4,14 @@
 //! instead of the clock, which other programs disturb; prints a JSON object a line.
 #![allow(clippy::expect_used, clippy::print_stdout)]
 
-use std::fs;
+mod processor;
 
 use btfkit::kernel::Kernel;
 use btfkit::kernel::car::{Coefficients, Ends, Field};
 use btfkit::random::Hash;
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use processor::median_ns;
 use serde_json::json;
 
 fn main() {
@@ -19,34 +20,6 @@ fn main() {
     } else {
         divan::main();
     }
-}
-
-/// Nanoseconds that this thread has run.
-fn cpu_ns() -> f64 {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").expect("a kernel that counts");
-    text.split(' ').next().and_then(|field| field.parse().ok()).expect("a count")
-}
-
-/// The median over some runs of processor time for each item, nanoseconds. A run repeats the work until many ticks have
-/// passed, by which the kernel counts.
-fn median_ns(items: usize, mut work: impl FnMut()) -> f64 {
-    const RUNS: usize = 7;
-    const RUN_NS: f64 = 3e8;
-    work();
-    let mut run = || {
-        let (start, mut count) = (cpu_ns(), 0);
-        loop {
-            work();
-            count += 1;
-            let passed = cpu_ns() - start;
-            if passed > RUN_NS {
-                return passed / (count * items) as f64;
-            }
-        }
-    };
-    let mut times: Vec<f64> = (0..RUNS).map(|_| run()).collect();
-    times.sort_by(f64::total_cmp);
-    times[RUNS / 2]
 }
 
 fn by_processor() {

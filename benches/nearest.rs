@@ -1,7 +1,9 @@
 //! The search for nearest normals and the scan, beside kiddo's k-d tree: `cargo bench --bench nearest`.
 //!
-//! Times are those of the processor in nanoseconds, medians of seven runs, all in one thread.
+//! Times are those of the processor in nanoseconds, medians of some runs, all in one thread.
 #![allow(clippy::expect_used, clippy::print_stdout)]
+
+mod processor;
 
 use std::hint::black_box;
 use std::num::NonZero;
@@ -12,6 +14,7 @@ use btfkit::texel::nearest::NearestNormals;
 use btfkit::texel::nearest::tree::{Neighbour, Tree};
 use btfkit::texel::scan::{Neighbours, Scan};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use processor::median_ns;
 
 /// As many as a tile of 137 x 142 has.
 const NORMALS: u32 = 137 * 142;
@@ -110,19 +113,7 @@ fn unit(vector: [f64; 3]) -> [f32; 3] {
     vector.map(|v| (v / length) as f32)
 }
 
-/// Prints the median time of seven runs, divided by `count`.
-fn report(data: &str, what: &str, count: f64, mut run: impl FnMut()) {
-    let mut times = [0; 7].map(|_| {
-        let start = cpu_seconds();
-        run();
-        (cpu_seconds() - start) * 1e9 / count
-    });
-    times.sort_by(f64::total_cmp);
-    println!("{data}: {what}: {:.1} ns", times[3]);
-}
-
-/// Seconds of the processor that this thread has used.
-fn cpu_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
-    text.split(' ').next().and_then(|time| time.parse::<f64>().ok()).expect("a time") * 1e-9
+/// Prints the median time of some runs, divided by `count`.
+fn report(data: &str, what: &str, count: f64, run: impl FnMut()) {
+    println!("{data}: {what}: {:.1} ns", median_ns(count as usize, run));
 }

@@ -5,14 +5,20 @@
 pub struct Scan {
     /// Cluster of each tile texel.
     index: Vec<u16>,
-    /// D of (26) transposed, in L* units: row by row for each neighbour what each cluster costs beside it. A last row of
-    /// zeros is for a neighbour that does not exist.
-    costs: Vec<f32>,
+    /// D of (26) transposed: row by row for each neighbour what each cluster costs beside it. A last row of zeros is
+    /// for a neighbour that does not exist.
+    costs: Vec<u64>,
     clusters: usize,
 }
 
-/// Candidates that are compared at once.
-const SIXTEEN: usize = 16;
+/// Candidates compared at a time.
+const TOGETHER: usize = 16;
+
+/// Costs are whole numbers, multiples of this: below there is room for the rank of a candidate.
+const COST: u64 = TOGETHER as u64;
+
+/// Bits of the greatest cost without those of the rank: four may be added.
+const COST_BITS: i32 = 57;
 
 /// The clusters that are already chosen around a row.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,12 +32,19 @@ pub struct Neighbours<'a> {
 }
 
 impl Scan {
-    /// `index` is I of the tile, `distance` the square D of (26), finite numbers from 0 on.
+    /// `index` is I of the tile, `distance` the square D of (26).
+    ///
+    /// Distances become whole numbers, of which the greatest has 57 bits: a distance of f32 keeps all its bits unless
+    /// it is 2^33 times smaller than the greatest, and sums are exact.
     pub fn new(index: Vec<u16>, distance: &[f32]) -> Self {
         let clusters = distance.len().isqrt();
+        let greatest = distance.iter().copied().filter(|distance| distance.is_finite()).fold(0.0, f32::max);
+        let scale = f64::from(COST_BITS - f64::from(greatest).log2().ceil().max(-200.0) as i32).exp2();
+        let cost = |distance: f32| (f64::from(distance.min(greatest)) * scale) as u64 * COST;
         let costs = (0..clusters)
             .flat_map(|neighbour| (0..clusters).map(move |cluster| distance[cluster * clusters + neighbour]));
-        Self { index, costs: costs.chain(std::iter::repeat_n(0.0, clusters)).collect(), clusters }
+        let costs = costs.map(cost).chain(std::iter::repeat_n(0, clusters)).collect();
+        Self { index, costs, clusters }
     }
 
     /// The cluster of a source texel.
@@ -42,81 +55,60 @@ impl Scan {
 
     /// What each cluster costs beside a neighbour, if there is one.
     #[inline]
-    fn costs(&self, neighbour: Option<u16>) -> &[f32] {
+    fn costs(&self, neighbour: Option<u16>) -> &[u64] {
         &self.costs[neighbour.map_or(self.clusters, usize::from) * self.clusters..][..self.clusters]
     }
 
     /// Chooses a row: `candidates` holds those of each texel one after another, nearest normal first;
     /// `sources` receives the tile texel chosen.
     ///
-    /// Costs of the neighbours that exist are added in f64. Ties go to the nearest normal; so does a texel without
-    /// neighbours.
+    /// Costs of the neighbours that exist are added. Ties go to the nearest normal; so does a texel without neighbours.
     pub fn choose_row(&self, candidates: &[u32], neighbours: Neighbours<'_>, sources: &mut [u32]) {
         let Some(last) = sources.len().checked_sub(1) else { return };
-        let per_texel = candidates.len() / sources.len();
-        let (mut left, mut first) = (None, None);
-        for (x, (candidates, source)) in candidates.chunks_exact(per_texel).zip(sources).enumerate() {
-            let [above, below] = [neighbours.above, neighbours.below].map(|row| row.map(|row| row[x]));
-            let right = first.filter(|_| neighbours.wraps && x == last);
-            *source = match (candidates.try_into(), right, below) {
-                (Ok(sixteen), None, None) => self.choose_of_sixteen(sixteen, left, above),
-                _ => self.choose(candidates, [left, above, right, below]),
-            };
-            left = Some(self.cluster(*source));
-            first = first.or(left);
-        }
+        let (candidates, last_candidates) = candidates.split_at(candidates.len() / sources.len() * last);
+        let (sources, last_source) = sources.split_at_mut(last);
+        let above = |x: usize| self.costs(neighbours.above.map(|row| row[x]));
+        let below = |x: usize| self.costs(neighbours.below.map(|row| row[x]));
+        let left = match neighbours.below {
+            None => self.choose_run(candidates, None, |x| [above(x)], sources),
+            Some(_) => self.choose_run(candidates, None, |x| [above(x), below(x)], sources),
+        };
+        let right = sources.first().filter(|_| neighbours.wraps).map(|&first| self.cluster(first));
+        let around = |_| [above(last), self.costs(right), below(last)];
+        self.choose_run(last_candidates, left, around, last_source);
     }
 
-    /// The first of the candidates with the least cost.
-    fn choose(&self, candidates: &[u32], around: [Option<u16>; 4]) -> u32 {
-        let around = around.map(|neighbour| self.costs(neighbour));
-        let (mut best, mut least) = (candidates[0], f64::INFINITY);
-        for &candidate in candidates {
-            let cluster = usize::from(self.cluster(candidate));
-            let cost = around.iter().map(|costs| f64::from(costs[cluster])).sum();
-            if cost < least {
-                (best, least) = (candidate, cost);
-            }
-        }
-        best
-    }
-
-    /// The same of sixteen between two neighbours, of which the serial scan has nearly all to do.
-    ///
-    /// Rounding keeps order: what costs least costs least in f32 too. Only where several do are their costs told apart
-    /// in f64.
+    /// Chooses for texels that follow each other, the first of which is right of `left`; `around` gives the costs
+    /// beside other neighbours. Returns the cluster of the last.
     #[inline]
-    fn choose_of_sixteen(&self, candidates: &[u32; SIXTEEN], left: Option<u16>, above: Option<u16>) -> u32 {
-        let [left, above] = [left, above].map(|neighbour| &self.costs(neighbour)[..self.clusters]);
-        let mut clusters = [0; SIXTEEN];
-        let mut costs = [0.0; SIXTEEN];
-        for ((cluster, cost), &candidate) in clusters.iter_mut().zip(&mut costs).zip(candidates) {
-            *cluster = usize::from(self.cluster(candidate));
-            *cost = left[*cluster] + above[*cluster];
-        }
-        // Four minima, so that none waits for all others.
-        let less = |a: f32, b: f32| if a < b { a } else { b };
-        let mut least = [f32::INFINITY; 4];
-        for (rank, &cost) in costs.iter().enumerate() {
-            least[rank % 4] = less(cost, least[rank % 4]);
-        }
-        let least = less(less(least[0], least[1]), less(least[2], least[3]));
-        let mut ties = costs
-            .iter()
-            .enumerate()
-            .fold(0_u32, |ties, (rank, &cost)| ties | u32::from(cost == least) << rank);
-        let exactly = |rank: usize| f64::from(left[clusters[rank]]) + f64::from(above[clusters[rank]]);
-        let mut best = ties.trailing_zeros() as usize % SIXTEEN;
-        let mut least = exactly(best);
-        ties &= ties.wrapping_sub(1);
-        while ties != 0 {
-            let rank = ties.trailing_zeros() as usize;
-            if exactly(rank) < least {
-                (best, least) = (rank, exactly(rank));
+    fn choose_run<'a, const N: usize>(
+        &self,
+        candidates: &[u32],
+        mut left: Option<u16>,
+        around: impl Fn(usize) -> [&'a [u64]; N],
+        sources: &mut [u32],
+    ) -> Option<u16> {
+        let per_texel = candidates.len() / sources.len().max(1);
+        for (x, source) in sources.iter_mut().enumerate() {
+            // Of one length, so that one check is enough.
+            let around = around(x).map(|costs| &costs[..self.clusters]);
+            let left_costs = &self.costs(left)[..self.clusters];
+            let mut best = (u64::MAX, 0);
+            for candidates in candidates[x * per_texel..][..per_texel].chunks(TOGETHER) {
+                let mut least = u64::MAX;
+                for (rank, &candidate) in candidates.iter().enumerate() {
+                    let cluster = usize::from(self.cluster(candidate));
+                    let cost: u64 = around.iter().map(|costs| costs[cluster]).sum();
+                    least = least.min(cost + left_costs[cluster] + rank as u64);
+                }
+                if least / COST < best.0 {
+                    best = (least / COST, candidates[(least % COST) as usize]);
+                }
             }
-            ties &= ties - 1;
+            *source = best.1;
+            left = Some(self.cluster(best.1));
         }
-        candidates[best]
+        left
     }
 }
 
@@ -174,19 +166,6 @@ mod tests {
                 left = Some(index[source as usize]);
             }
         }
-    }
-
-    #[test]
-    fn costs_that_are_equal_in_f32_only_are_told_apart() {
-        // Beside 0 and 3, 1 costs 2^24 + 1 and 2 costs 2^24 + 1/2: both are 2^24 in f32.
-        let mut distance = [0.0; 16];
-        (distance[4], distance[8], distance[4 + 3], distance[8 + 3]) = (16_777_216.0, 16_777_216.0, 1.0, 0.5);
-        let scan = Scan::new(vec![0, 1, 2, 3], &distance);
-        let candidates: Vec<u32> = [0; 16].into_iter().chain([1; 15]).chain([2]).collect();
-        let mut sources = [9; 2];
-        let neighbours = Neighbours { above: Some(&[0, 3]), ..Neighbours::default() };
-        scan.choose_row(&candidates, neighbours, &mut sources);
-        assert_eq!(sources, [0, 2]);
     }
 
     #[test]

@@ -238,7 +238,7 @@ fn enlarge(
         keep_normals: true,
         band_rows: None,
     };
-    let found = Enlarged::open(output).is_ok_and(|e| (0..e.shard_rows()).all(|row| e.has_shard_row(row)));
+    let found = Enlarged::open(output).is_ok_and(|enlarged| enlarged.is_whole());
     times.time("enlarge", found, || enlarge::plan(&options)?.run(context).map(|_| ()))
 }
 

@@ -104,13 +104,13 @@ fn expand_axis(samples: &[f64], length: usize, fine: usize, inner: usize, bounda
 
 /// Expanded value on a coarse sample, from it and its two neighbours.
 #[inline]
-pub(super) fn even(before: f64, here: f64, after: f64) -> f64 {
+fn even(before: f64, here: f64, after: f64) -> f64 {
     ((before + after) + 6.0 * here) / 8.0
 }
 
 /// Expanded value half-way between two coarse samples.
 #[inline]
-pub(super) fn odd(here: f64, after: f64) -> f64 {
+fn odd(here: f64, after: f64) -> f64 {
     (here + after) / 2.0
 }
 

@@ -130,8 +130,7 @@ fn autocovariance(
             sums
         })
         .collect();
-    let at = |dy: usize, lag: usize| {
-        let down = folded(side, number, dy as f64);
+    let at = |down: &[Complex<f64>], lag: usize| {
         let mut sum = DMatrix::zeros(channels, channels);
         for (row, sums) in partly.iter().enumerate() {
             for i in 0..channels {
@@ -143,10 +142,8 @@ fn autocovariance(
         }
         sum
     };
-    (0..=lags.rows)
-        .flat_map(|dy| (0..side_lags).map(move |lag| (dy, lag)))
-        .map(|(dy, lag)| at(dy, lag))
-        .collect()
+    let rows_of_lags = (0..=lags.rows).map(|dy| folded(side, number, dy as f64));
+    rows_of_lags.flat_map(|down| (0..side_lags).map(|lag| at(&down, lag)).collect::<Vec<_>>()).collect()
 }
 
 /// Rows of frequencies that a row of the upper half stands for: itself and, but for 0 and the highest, its conjugate.

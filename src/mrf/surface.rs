@@ -6,6 +6,7 @@ use super::field::Field;
 use super::fit::fit;
 use super::marginals::{Marginals, Matching};
 use super::model::{Model, Options};
+use super::synthesis::Synthesis;
 use crate::error::Result;
 use crate::shape::Size;
 
@@ -76,8 +77,21 @@ impl Surface {
         Ok(Self { coordinates, field, marginals })
     }
 
+    /// The unit normals of the next rows of a synthesis of the field, `[row][width]`: as many rows as there is room for.
+    ///
+    /// # Errors
+    /// Those of [`Synthesis::next_row`].
+    pub fn next_rows(&self, synthesis: &mut Synthesis, width: usize, normals: &mut [[f32; 3]]) -> Result<()> {
+        let mut row = vec![0.0; width * self.field.channels()];
+        for normals in normals.chunks_exact_mut(width) {
+            synthesis.next_row(&mut row)?;
+            self.normals(&row, normals);
+        }
+        Ok(())
+    }
+
     /// The unit normals of a row of the field, planar `[channel][width]`.
-    pub fn normals(&self, row: &[f32], normals: &mut [[f32; 3]]) {
+    fn normals(&self, row: &[f32], normals: &mut [[f32; 3]]) {
         let width = normals.len();
         let channel = |n: usize| &row[n * width..][..width];
         let texels = normals.iter_mut().zip(channel(0)).zip(channel(1));

@@ -81,21 +81,18 @@ impl EnlargeState {
         let rest = bytes
             .strip_prefix(MAGIC)
             .ok_or_else(|| damaged("got another beginning, expected `btfkit enlarge 1`".to_owned()))?;
-        let (checksum, body) = rest
-            .split_at_checked(32)
-            .filter(|(_, body)| body.len() >= DIGEST_LENGTH + 8)
-            .ok_or_else(|| damaged(format!("ends after {} bytes", bytes.len())))?;
+        let ends = || damaged(format!("ends after {} bytes", bytes.len()));
+        let (checksum, body) = rest.split_at_checked(32).ok_or_else(ends)?;
         if Sha256::digest(body)[..] != *checksum {
             return Err(damaged("its checksum is another: the file is damaged".to_owned()));
         }
-        let (found, body) = body.split_at(DIGEST_LENGTH);
+        let (found, body) = body.split_at_checked(DIGEST_LENGTH).ok_or_else(ends)?;
         if found != digest.as_bytes() {
             return Err(Error::recipe(format!("{}: the state of another recipe", file.display()))
                 .hint("choose another name for the result, or delete the old one"));
         }
-        let (rows, field) = body.split_at(8);
-        let shard_rows = rows.iter().rev().fold(0_u64, |number, &byte| number << 8 | u64::from(byte));
-        Ok(Self { shard_rows: shard_rows as usize, field: field.to_vec() })
+        let (rows, field) = body.split_first_chunk().ok_or_else(ends)?;
+        Ok(Self { shard_rows: u64::from_le_bytes(*rows) as usize, field: field.to_vec() })
     }
 }
 

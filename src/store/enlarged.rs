@@ -104,6 +104,11 @@ impl Enlarged {
         })
     }
 
+    /// Whether all rows of shards have been written.
+    pub fn is_whole(&self) -> bool {
+        (0..self.shard_rows()).all(|row| self.has_shard_row(row))
+    }
+
     /// Writes a row of shards: `index` [rows, width], `normals` [rows, width, 3] where they are kept. Shards are
     /// packed on all threads of the pool.
     pub fn write_shard_row(&self, shard_row: usize, index: &[u16], normals: &[f32]) -> Result<()> {

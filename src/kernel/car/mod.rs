@@ -94,14 +94,13 @@ impl Field {
             }
         });
         let left: Vec<usize> = of_row(false).collect();
-        let farthest = |axis: usize| sites.iter().map(|s| s[axis].unsigned_abs() as usize).max().unwrap_or(0);
         let reach = left.iter().map(|&n| sites[n][1].unsigned_abs() as usize).max().unwrap_or(0);
         let along = Along::new(channels, reach, |dx, to, from| {
             left.iter().filter(|&&n| sites[n][1] as usize == dx).map(|&n| at(n, to, from)).sum()
         });
-        let pad = farthest(1);
+        let [highest, pad] = farthest(sites);
         let stride = width + 2 * pad + SLACK;
-        let slots = farthest(0) + 1;
+        let slots = highest + 1;
         let scratch = Scratch {
             noise: vec![0.0; channels * STRIP],
             sums: vec![0.0; channels * STRIP],
@@ -127,10 +126,9 @@ impl Field {
 
     /// Bytes of the rows of a field of this width.
     pub fn bytes(channels: usize, sites: &[[i32; 2]], width: usize) -> u64 {
-        let farthest =
-            |axis: usize| sites.iter().map(|s| u64::from(s[axis].unsigned_abs())).max().unwrap_or(0);
-        let stride = width as u64 + 2 * farthest(1) + SLACK as u64;
-        (farthest(0) + 1) * stride * channels as u64 * size_of::<f32>() as u64
+        let [highest, pad] = farthest(sites).map(|texels| texels as u64);
+        let stride = width as u64 + 2 * pad + SLACK as u64;
+        (highest + 1) * stride * channels as u64 * size_of::<f32>() as u64
     }
 
     /// Makes the next row. `noise(channel, column, out)` gives the standard normals z of columns `column ..` of a channel;
@@ -227,6 +225,11 @@ impl Field {
             }
         }
     }
+}
+
+/// The farthest row above and the farthest column to either side that sites reach.
+fn farthest(sites: &[[i32; 2]]) -> [usize; 2] {
+    [0, 1].map(|axis| sites.iter().map(|s| s[axis].unsigned_abs() as usize).max().unwrap_or(0))
 }
 
 /// A strip of a row.

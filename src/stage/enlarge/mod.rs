@@ -228,7 +228,7 @@ impl Plan {
         let state = EnlargeState::read(&output.path, &digest)?;
         let found = match &state {
             Some(state) => state.shard_rows,
-            None if (0..store.shard_rows()).all(|row| store.has_shard_row(row)) => store.shard_rows(),
+            None if store.is_whole() => store.shard_rows(),
             None => 0,
         };
         let report = Report {

@@ -48,11 +48,7 @@ impl Source<'_> {
         let end = (first + self.band_rows).min(shard_end).min(self.height);
         band.rows = end - first;
         band.normals.resize(band.rows * self.width, [0.0; 3]);
-        let mut row = vec![0.0; self.width * self.surface.field.channels()];
-        for normals in band.normals.chunks_exact_mut(self.width) {
-            self.field.next_row(&mut row)?;
-            self.surface.normals(&row, normals);
-        }
+        self.surface.next_rows(&mut self.field, self.width, &mut band.normals)?;
         let ends_shards = band.rows > 0 && (end == shard_end || end == self.height);
         band.state = ends_shards.then(|| self.field.state());
         Ok(())

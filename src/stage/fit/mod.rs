@@ -15,6 +15,7 @@ use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::store::field::FieldReport;
 use crate::store::model::{Model, Stage};
+use crate::texel::tile::Tile;
 
 /// How to fit.
 #[derive(Clone, Debug)]
@@ -85,7 +86,7 @@ impl Plan {
         let tile = self.model.tile()?;
         let normals = self.model.normals()?;
         let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
-        let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
+        let boundary = boundary_of(&tile);
         let options = mrf::Options { kind, levels, gains, boundary };
         let surface =
             context.install(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
@@ -105,6 +106,10 @@ impl Plan {
 pub fn compare(model: &Path, context: &Context<'_>) -> Result<statistics::Comparison> {
     let model = Model::open(model)?;
     let (tile, normals, surface) = (model.tile()?, model.normals()?, model.surface()?);
-    let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
-    context.install(|| statistics::Comparison::of(&surface, tile.size, normals, boundary))
+    context.install(|| statistics::Comparison::of(&surface, tile.size, normals, boundary_of(&tile)))
+}
+
+/// What lies beyond the border of a tile's normal map.
+fn boundary_of(tile: &Tile) -> Boundary {
+    if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::mrf::second_order::{Autocovariance, Lags, variances};
-use crate::mrf::{Boundary, Extent, Field, Surface, Synthesis, pyramid};
+use crate::mrf::{Boundary, Coordinates, Extent, Field, Surface, Synthesis, pyramid};
 use crate::shape::Size;
 
 /// Names of the components.
@@ -66,8 +66,7 @@ impl Distribution {
 
 impl Statistics {
     fn of(size: Size, normals: Vec<[f32; 3]>, boundary: Boundary, lags: Lags, levels: usize) -> Result<Self> {
-        let samples = normals.iter().flatten().map(|&value| f64::from(value)).collect();
-        let (field, _) = Field::new(size.height, size.width, 3, samples)?.centred();
+        let (field, _) = Coordinates::Normals.field(size, &normals)?.centred();
         let bands = pyramid::decompose(&field, levels, boundary)?;
         let spread = |band: &Field| {
             let variances = variances(band);
@@ -125,12 +124,8 @@ impl Comparison {
     pub fn of(surface: &Surface, size: Size, normals: Vec<[f32; 3]>, boundary: Boundary) -> Result<Self> {
         let Size { height, width } = PROBE;
         let mut field = Synthesis::new(&surface.field, 1, height, width, Extent::Endless, Kernel::fastest())?;
-        let mut row = vec![0.0; width * surface.field.channels()];
         let mut synthesised = vec![[0.0; 3]; PROBE.texels()];
-        for normals in synthesised.chunks_exact_mut(width) {
-            field.next_row(&mut row)?;
-            surface.normals(&row, normals);
-        }
+        surface.next_rows(&mut field, width, &mut synthesised)?;
         let lags = Lags::of(size.height, size.width);
         let sizes = pyramid::sizes(size.height, size.width, usize::BITS as usize);
         let levels = sizes.iter().take_while(|side| side[0].min(side[1]) >= LEAST_SIDE).count().max(1);

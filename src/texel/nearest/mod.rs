@@ -22,9 +22,8 @@ const TEXEL_BYTES: usize = 64;
 
 /// Normals of a tile, ready to be searched.
 pub struct NearestNormals {
-    twins: Twins,
-    /// Whether there are texels of equal normals at all.
-    has_twins: bool,
+    /// None if no two normals are equal.
+    twins: Option<Twins>,
     /// Over the distinct normals.
     tree: Tree,
     /// None if more neighbours are wanted than can be ranked.
@@ -43,18 +42,17 @@ impl NearestNormals {
         let leaves = (1..=RANKS)
             .contains(&count)
             .then(|| Leaves::new(&points, &Search { normals: &twins.normals, tree: &tree, count, kernel }));
-        Self { has_twins: !twins.are_none(), twins, tree, leaves, count, kernel }
+        Self { twins: (!twins.are_none()).then_some(twins), tree, leaves, count, kernel }
     }
 
     /// Finds the nearest normals of each query: `found` is [query, rank], texel numbers, nearest first. There must be
     /// as many normals as ranks.
     pub fn find_row(&self, queries: &[[f32; 3]], found: &mut [u32]) {
         self.find_distinct(queries, found);
-        if self.has_twins && self.count > 0 {
-            let mut buffer = Vec::new();
-            for (&query, found) in queries.iter().zip(found.chunks_exact_mut(self.count)) {
-                self.twins.tell_apart(query, found, &mut buffer);
-            }
+        let Some(twins) = self.twins.as_ref().filter(|_| self.count > 0) else { return };
+        let mut buffer = Vec::new();
+        for (&query, found) in queries.iter().zip(found.chunks_exact_mut(self.count)) {
+            twins.tell_apart(query, found, &mut buffer);
         }
     }
 
@@ -117,7 +115,7 @@ impl NearestNormals {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.twins.memory_bytes()
+        self.twins.as_ref().map_or(0, Twins::memory_bytes)
             + self.tree.memory_bytes()
             + self.leaves.as_ref().map_or(0, Leaves::memory_bytes)
     }

@@ -11,6 +11,7 @@
 //! survive, [`texel`], [`mrf`] and [`color`] the science, [`kernel`] the hot loops.
 
 pub mod archive;
+pub mod coherent;
 pub mod color;
 pub mod demo;
 pub mod error;

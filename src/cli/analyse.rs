@@ -14,6 +14,7 @@ use btfkit::texel::cluster::lloyd::Limits;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
+use super::appearance::{appearance_plan, tell_appearance};
 use super::fit::{FitOptions, fit_plan, tell_field};
 use super::table::{row, table};
 use super::{Tell, bytes_text};
@@ -231,6 +232,7 @@ impl Whole {
         tell_normals(&plan.run(context)?, tell);
         let plan = fit_plan(&model, &self.fit)?;
         tell_field(&plan.run(context)?, tell);
+        tell_appearance(&appearance_plan(&model)?.run(context)?, tell);
         Ok(())
     }
 }

@@ -1,11 +1,13 @@
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use btfkit::coherent::JITTER_ONE;
 use btfkit::error::Result;
 use btfkit::run::Context;
 use btfkit::shape::Size;
-use btfkit::stage::enlarge;
-use clap::Args;
+use btfkit::stage::enlarge::{self, By, coherent, paper};
+use btfkit::stage::import::Shard;
+use clap::{Args, ValueEnum};
 
 use super::{Tell, bytes_text};
 
@@ -17,11 +19,13 @@ const MOST_SEEDS: u64 = 1 << 16;
 #[command(after_help = "\
 Examples:
   btf enlarge wood.model.zarr wood-4k.zarr --size 4096x4096
-  btf enlarge wood.model.zarr other.zarr --size 1024x1024 --seed 2 --keep-normals
+  btf enlarge wood.model.zarr other.zarr --size 1024x1024 --seed 2
   btf enlarge wood.model.zarr wood.zarr --size 2048x2048 --seed 1..8     makes wood-1.zarr to wood-8.zarr
   btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      joins at its own borders
-Interrupted, the same command goes on from the last row of shards (512 texels). The same model,
-size and seed give the same bytes whatever the memory, the threads, the band and the interruptions.")]
+  btf enlarge wood.model.zarr huge.zarr --size 65536x65536 --shard 3/8   one of eight jobs that share the work
+  btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of Filip and Haindl 2007
+The same model, method, size and seed give the same bytes, whatever the memory, the threads, the shards and the
+interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
     /// The model
     model: PathBuf,
@@ -30,26 +34,47 @@ pub(super) struct Enlarge {
     /// Its size, WIDTHxHEIGHT
     #[arg(long)]
     size: Size,
-    /// Seed of the noise; another seed gives another piece of the same material. FIRST..LAST makes one of each,
-    /// the last too
+    /// How to enlarge
+    #[arg(long, value_enum, default_value = "coherent")]
+    method: Method,
+    /// Seed of all that is drawn at random: another seed gives another piece of the same material. FIRST..LAST makes
+    /// one output for each, the last included
     #[arg(long, default_value = "1", value_parser = seeds)]
     seed: RangeInclusive<u64>,
-    /// Number of nearest normals among which (25) chooses, n_k
-    #[arg(long, default_value_t = 16)]
-    candidates: usize,
-    /// Make an output that joins at its own borders; its sides must then be multiples of a power of two, which
-    /// is told if they are not
+    /// Make an output that joins at its own borders. Its sides must be multiples of a power of two, which an error
+    /// names if they are not
     #[arg(long)]
     tileable: bool,
-    /// Keep the synthesised normals beside the index
+    /// Make only part K of N of the output (coherent): N jobs share the work, in any order
+    #[arg(long, value_name = "K/N", default_value = "0/1")]
+    shard: Shard,
+    /// How far pieces of the exemplar are moved against each other, from 0 to 1 (coherent): more repeats less, less fits
+    /// better [default: 0.5, and 0 where the material has a lattice]
+    #[arg(long, value_parser = jitter)]
+    jitter: Option<f64>,
+    /// Do not write which texel of the tile each texel is (coherent)
+    #[arg(long)]
+    no_source: bool,
+    /// Write normals beside the index: the tile's (coherent), or the synthesised ones (paper)
     #[arg(long)]
     keep_normals: bool,
-    /// Rows treated at a time; changes memory, not the result [default: as many as fit 2 MiB]
+    /// Number of nearest normals among which one is chosen (paper)
+    #[arg(long, default_value_t = 16)]
+    candidates: usize,
+    /// Rows in work at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     band: Option<u32>,
-    /// Only say what would be done
+    /// Only print what would be done
     #[arg(long)]
     dry_run: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Method {
+    /// Pieces of the exemplar that continue each other: keeps structure
+    Coherent,
+    /// Nearest normals of a random field: Filip and Haindl 2007
+    Paper,
 }
 
 impl Enlarge {
@@ -59,22 +84,22 @@ impl Enlarge {
             output: self.output.clone(),
             size: self.size,
             seeds: self.seed.clone(),
-            candidates: self.candidates,
             tileable: self.tileable,
-            keep_normals: self.keep_normals,
-            band_rows: self.band.map(|rows| rows as usize),
+            by: self.by(),
+            shard: self.shard,
         })?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return tell.plan(&plan.summary(context));
         }
         for report in plan.run(context)? {
             tell.line(format!(
-                "{}: {} from seed {}; {} rows of shards written, {} found done",
+                "{}: {} from seed {}; {} {}s written, {} found done",
                 report.output.display(),
                 self.size,
                 report.seed,
-                report.shard_rows_written,
-                report.shard_rows_found
+                report.written,
+                report.unit,
+                report.found
             ));
             tell.line(format!(
                 "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
@@ -85,6 +110,28 @@ impl Enlarge {
         }
         Ok(())
     }
+
+    fn by(&self) -> By {
+        let keep_normals = self.keep_normals;
+        match self.method {
+            Method::Paper => By::Paper(paper::Options {
+                candidates: self.candidates,
+                keep_normals,
+                band_rows: self.band.map(|rows| rows as usize),
+            }),
+            Method::Coherent => By::Coherent(coherent::Options {
+                jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
+                keep_source: !self.no_source,
+                keep_normals,
+            }),
+        }
+    }
+}
+
+/// A number from 0 to 1.
+fn jitter(text: &str) -> std::result::Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| format!("expected a number from 0 to 1, got {text:?}"))
 }
 
 /// `7`, or `1..8` for eight seeds.

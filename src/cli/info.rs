@@ -130,11 +130,15 @@ impl Info {
 
     fn enlarged(&self) -> Result<Vec<Vec<String>>> {
         let enlarged = Enlarged::open(self.path())?;
-        let done = (0..enlarged.shard_rows()).filter(|&row| enlarged.has_shard_row(row)).count();
+        let shards = enlarged.shards();
+        let is_done = |&n: &usize| enlarged.has_shard(n / shards.width, n % shards.width);
+        let done = (0..shards.texels()).filter(is_done).count();
         Ok(vec![
             row!["kind", enlarged::KIND],
             row!["size", enlarged.size()],
-            row!["rows of shards done", format!("{done} of {}", enlarged.shard_rows())],
+            row!["method", format!("{:?}", enlarged.method()?).to_lowercase()],
+            row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
+            row!["shards done", format!("{done} of {}", shards.texels())],
         ])
     }
 }

@@ -1,6 +1,7 @@
 //! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
 
 mod analyse;
+mod appearance;
 mod check;
 mod curve;
 mod deepzoom;
@@ -90,6 +91,7 @@ enum Command {
     Curve(curve::Curve),
     Normals(analyse::Normals),
     Fit(fit::Fit),
+    Appearance(appearance::Appearance),
     Compare(analyse::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
@@ -145,6 +147,7 @@ impl Command {
             Self::Curve(command) => command.run(context, tell),
             Self::Normals(command) => command.run(context, tell),
             Self::Fit(command) => command.run(context, tell),
+            Self::Appearance(command) => command.run(context, tell),
             Self::Compare(command) => command.run(context, tell),
             Self::Enlarge(command) => command.run(context, tell),
             Self::Image(command) => command.run(context, tell),

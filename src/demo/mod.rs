@@ -233,10 +233,13 @@ fn enlarge(
         output: output.to_owned(),
         size: settings.enlarged,
         seeds: settings.seed..=settings.seed,
-        candidates: settings.candidates,
         tileable: false,
-        keep_normals: true,
-        band_rows: None,
+        by: enlarge::By::Paper(enlarge::paper::Options {
+            candidates: settings.candidates,
+            keep_normals: true,
+            band_rows: None,
+        }),
+        shard: Shard::WHOLE,
     };
     let found = Enlarged::open(output).is_ok_and(|enlarged| enlarged.is_whole());
     times.time("enlarge", found, || enlarge::plan(&options)?.run(context).map(|_| ()))

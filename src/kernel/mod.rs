@@ -3,6 +3,7 @@
 pub mod absolute_difference;
 pub mod bounds;
 pub mod car;
+pub mod coherent;
 pub mod collapse;
 pub mod counting;
 pub mod noise;

@@ -1,22 +1,46 @@
-//! The enlarged index store: I_S [y, x] in square shards, normals beside it on request.
+//! The enlarged index store: the cluster of every texel, I_S [y, x], in square shards; beside it, where the method
+//! knows it, the tile's texel that each texel is, and normals on request.
 
 use std::path::Path;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
+use crate::store::model::Stage;
 use crate::store::{Array, Layout, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
 
-/// Side of a shard in texels: the index is written in rows of shards.
+/// Side of a shard in texels: what is written at once.
 pub const SHARD_SIDE: usize = 512;
 
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
+
+/// How an index was enlarged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Nearest normals of a random field, chosen by (25): the paper's. Recipes that name no method mean it.
+    #[default]
+    Paper,
+    /// Source positions that continue their neighbours, from coarse to fine.
+    Coherent,
+}
+
+impl Method {
+    /// The stages of a model that it depends on.
+    pub fn stages(self) -> &'static [Stage] {
+        match self {
+            Self::Paper => &[Stage::Cluster, Stage::Fit],
+            Self::Coherent => &[Stage::Cluster, Stage::Appearance],
+        }
+    }
+}
 
 /// An enlarged index store.
 pub struct Enlarged {
@@ -24,18 +48,32 @@ pub struct Enlarged {
     size: Size,
     wide: bool,
     index: Array,
+    source: Option<Array>,
     normals: Option<Array>,
 }
 
 /// What an enlarged index is, for its attributes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// Rows and columns.
     pub size: Size,
     /// Number of clusters that it refers to.
     pub clusters: usize,
-    /// Whether the synthesised normals are kept.
+    /// Size of the tile, where the source of each texel is kept.
+    pub source: Option<Size>,
+    /// Whether normals are kept.
     pub keep_normals: bool,
+}
+
+/// Texels of a window, row by row; what is not kept is empty.
+#[derive(Clone, Copy, Debug)]
+pub struct Texels<'a> {
+    /// Clusters.
+    pub index: &'a [u16],
+    /// Texels of the tile, row * width + column.
+    pub source: &'a [u32],
+    /// Normals, three components each.
+    pub normals: &'a [f32],
 }
 
 impl Enlarged {
@@ -46,15 +84,22 @@ impl Enlarged {
         let store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
         store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}))?;
-        let wide = description.clusters > 256;
+        let Description { size, clusters, .. } = *description;
+        let wide = clusters > 256;
         let index = if wide {
-            create::<u16>(&store, description.size)
+            create::<u16>(&store, "index", size, Map::new())
         } else {
-            create::<u8>(&store, description.size)
+            create::<u8>(&store, "index", size, Map::new())
         }?;
-        let normals =
-            description.keep_normals.then(|| create_normals(&store, description.size)).transpose()?;
-        Ok(Self { store, size: description.size, wide, index, normals })
+        let of_tile = |tile: Size| {
+            let mut attributes = Map::new();
+            attributes.insert("meaning".to_owned(), json!("row * width + column of the tile's texel"));
+            attributes.insert("tile".to_owned(), json!([tile.height, tile.width]));
+            create::<u32>(&store, "source", size, attributes)
+        };
+        let source = description.source.map(of_tile).transpose()?;
+        let normals = description.keep_normals.then(|| create_normals(&store, size)).transpose()?;
+        Ok(Self { store, size, wide, index, source, normals })
     }
 
     /// Opens an enlarged index for reading.
@@ -69,10 +114,11 @@ impl Enlarged {
                 index.shape()
             )));
         };
-        let keeps = attributes.get("recipe").and_then(|r| r.get("keep_normals")).and_then(Value::as_bool);
-        let normals = (keeps == Some(true)).then(|| store.open_array("normals")).transpose()?;
+        let keeps = |name: &str| attributes.get("recipe").and_then(|r| r.get(name)?.as_bool()) == Some(true);
+        let source = keeps("source").then(|| store.open_array("source")).transpose()?;
+        let normals = keeps("keep_normals").then(|| store.open_array("normals")).transpose()?;
         let wide = *index.data_type() == u16::data_type();
-        Ok(Self { store, size: Size::new(height as usize, width as usize), wide, index, normals })
+        Ok(Self { store, size: Size::new(height as usize, width as usize), wide, index, source, normals })
     }
 
     /// Our attributes.
@@ -80,79 +126,96 @@ impl Enlarged {
         self.store.expect(KIND)
     }
 
+    /// How it was enlarged.
+    ///
+    /// # Errors
+    /// A method that this program does not know.
+    pub fn method(&self) -> Result<Method> {
+        let attributes = self.attributes()?;
+        let Some(name) = attributes.get("recipe").and_then(|recipe| recipe.get("rule")) else {
+            return Ok(Method::default());
+        };
+        serde_json::from_value(name.clone())
+            .map_err(|error| Error::input(format!("{}: recipe: {error}", self.store.path().display())))
+    }
+
     /// Rows and columns.
     pub fn size(&self) -> Size {
         self.size
     }
 
-    /// Whether the synthesised normals were kept.
+    /// Whether normals were kept.
     pub fn has_normals(&self) -> bool {
         self.normals.is_some()
     }
 
-    /// Number of rows of shards, each [`SHARD_SIDE`] texels high (the last may be cut off).
-    pub fn shard_rows(&self) -> usize {
-        self.size.height.div_ceil(SHARD_SIDE)
+    /// Whether the source of each texel was kept.
+    pub fn has_source(&self) -> bool {
+        self.source.is_some()
     }
 
-    /// Whether a row of shards has been written.
-    pub fn has_shard_row(&self, shard_row: usize) -> bool {
-        (0..self.size.width.div_ceil(SHARD_SIDE)).all(|sx| {
-            let (sy, sx) = (shard_row as u64, sx as u64);
-            self.store.has_chunk(&self.index, &[sy, sx])
-                && self.normals.as_ref().is_none_or(|normals| self.store.has_chunk(normals, &[sy, sx, 0]))
-        })
+    /// Rows and columns of shards, each [`SHARD_SIDE`] texels a side (the last may be cut off).
+    pub fn shards(&self) -> Size {
+        Size::new(self.size.height.div_ceil(SHARD_SIDE), self.size.width.div_ceil(SHARD_SIDE))
     }
 
-    /// Whether all rows of shards have been written.
+    /// Whether a shard has been written.
+    pub fn has_shard(&self, shard_row: usize, shard_column: usize) -> bool {
+        let place = [shard_row as u64, shard_column as u64];
+        let has = |array: &Option<Array>, place: &[u64]| {
+            array.as_ref().is_none_or(|array| self.store.has_chunk(array, place))
+        };
+        self.store.has_chunk(&self.index, &place)
+            && has(&self.source, &place)
+            && has(&self.normals, &[place[0], place[1], 0])
+    }
+
+    /// Whether all shards have been written.
     pub fn is_whole(&self) -> bool {
-        (0..self.shard_rows()).all(|row| self.has_shard_row(row))
+        let Size { height, width } = self.shards();
+        (0..height * width).all(|n| self.has_shard(n / width, n % width))
     }
 
-    /// Writes a row of shards: `index` [rows, width], `normals` [rows, width, 3] where they are kept. Shards are
-    /// packed on all threads of the pool.
-    pub fn write_shard_row(&self, shard_row: usize, index: &[u16], normals: &[f32]) -> Result<()> {
-        let write = |sx: usize| {
-            let place = [shard_row as u64, sx as u64];
+    /// Writes the shards of a window that begins and ends at borders of shards, on all threads of the pool.
+    pub fn write(&self, window: Window, texels: Texels<'_>) -> Result<()> {
+        let across = window.size.width.div_ceil(SHARD_SIDE);
+        let write = |n: usize| {
+            let (row, column) = (n / across, n % across);
+            let place = [(window.y / SHARD_SIDE + row) as u64, (window.x / SHARD_SIDE + column) as u64];
+            let part = Part { width: window.size.width, top: row * SHARD_SIDE, left: column * SHARD_SIDE };
             if let Some(array) = &self.normals {
-                let shard = self.cut(normals, sx, 3);
+                let shard = part.cut(texels.normals, 3);
                 self.store.write_chunk(array, &[place[0], place[1], 0], shard)?;
             }
-            let shard = self.cut(index, sx, 1);
+            if let Some(array) = &self.source {
+                self.store.write_chunk(array, &place, part.cut(texels.source, 1))?;
+            }
+            let shard = part.cut(texels.index, 1);
             if self.wide {
                 return self.store.write_chunk(&self.index, &place, shard);
             }
             let narrow: Vec<u8> = shard.iter().map(|&cluster| cluster as u8).collect();
             self.store.write_chunk(&self.index, &place, narrow)
         };
-        (0..self.size.width.div_ceil(SHARD_SIDE)).into_par_iter().try_for_each(write)
-    }
-
-    /// One shard of a row of shards, padded by zeros to its full size.
-    fn cut<T: Copy + Default>(&self, rows: &[T], shard_column: usize, elements: usize) -> Vec<T> {
-        let width = self.size.width;
-        let x0 = shard_column * SHARD_SIDE;
-        let columns = SHARD_SIDE.min(width - x0);
-        let mut shard = vec![T::default(); SHARD_SIDE * SHARD_SIDE * elements];
-        for (row, to) in
-            rows.chunks_exact(width * elements).zip(shard.chunks_exact_mut(SHARD_SIDE * elements))
-        {
-            to[..columns * elements].copy_from_slice(&row[x0 * elements..(x0 + columns) * elements]);
-        }
-        shard
+        (0..window.size.height.div_ceil(SHARD_SIDE) * across).into_par_iter().try_for_each(write)
     }
 
     /// Clusters of a window, row by row.
     pub fn read(&self, window: Window) -> Result<Vec<u16>> {
-        let start = [window.y as u64, window.x as u64];
-        let extent = [window.size.height as u64, window.size.width as u64];
+        let [start, extent] = bounds(window);
         if self.wide {
             return self.store.read_box::<u16>(&self.index, &start, &extent);
         }
         Ok(self.store.read_box::<u8>(&self.index, &start, &extent)?.into_iter().map(u16::from).collect())
     }
 
-    /// Synthesised normals of a window, where they were kept.
+    /// Source texels of a window, `row * width + column` in the tile, where they were kept. Not checked against the tile.
+    pub fn read_source(&self, window: Window) -> Result<Option<Vec<u32>>> {
+        let [start, extent] = bounds(window);
+        self.source.as_ref().map(|array| self.store.read_box::<u32>(array, &start, &extent)).transpose()
+    }
+
+    /// Normals of a window, where they were kept.
     pub fn read_normals(&self, window: Window) -> Result<Option<Vec<[f32; 3]>>> {
         let Some(array) = &self.normals else { return Ok(None) };
         let start = [window.y as u64, window.x as u64, 0];
@@ -162,7 +225,32 @@ impl Enlarged {
     }
 }
 
-fn create<T: Named>(store: &Store, size: Size) -> Result<Array> {
+/// Where a shard lies in the texels of a window.
+struct Part {
+    /// Texels of a row of the window.
+    width: usize,
+    top: usize,
+    left: usize,
+}
+
+impl Part {
+    /// The shard, padded by zeros to its full size.
+    fn cut<T: Copy + Default>(&self, texels: &[T], elements: usize) -> Vec<T> {
+        let columns = SHARD_SIDE.min(self.width - self.left) * elements;
+        let mut shard = vec![T::default(); SHARD_SIDE * SHARD_SIDE * elements];
+        let rows = texels.chunks_exact(self.width * elements).skip(self.top);
+        for (row, to) in rows.zip(shard.chunks_exact_mut(SHARD_SIDE * elements)) {
+            to[..columns].copy_from_slice(&row[self.left * elements..][..columns]);
+        }
+        shard
+    }
+}
+
+fn bounds(window: Window) -> [[u64; 2]; 2] {
+    [[window.y as u64, window.x as u64], [window.size.height as u64, window.size.width as u64]]
+}
+
+fn create<T: Named>(store: &Store, name: &str, size: Size, attributes: Map<String, Value>) -> Result<Array> {
     let layout = Layout {
         codecs: None,
         shape: vec![size.height as u64, size.width as u64],
@@ -170,9 +258,9 @@ fn create<T: Named>(store: &Store, size: Size) -> Result<Array> {
         shard: Some(vec![SHARD_SIDE as u64; 2]),
         data_type: T::data_type(),
         names: &["y", "x"],
-        attributes: Map::new(),
+        attributes,
     };
-    store.create_array("index", &layout)
+    store.create_array(name, &layout)
 }
 
 fn create_normals(store: &Store, size: Size) -> Result<Array> {

@@ -88,6 +88,13 @@ impl FieldReport {
     }
 }
 
+/// Names of the arrays of some levels.
+pub(super) fn arrays(levels: usize) -> Vec<String> {
+    let of_level =
+        |level: usize| ["gamma", "sigma", "neighbourhood"].map(|name| format!("mrf/level_{level}/{name}"));
+    std::iter::once("mrf/mean".to_owned()).chain((0..levels).flat_map(of_level)).collect()
+}
+
 /// Writes a surface's model under `mrf/`.
 pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
     let field = &surface.field;

@@ -2,6 +2,7 @@
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
+pub mod appearance;
 pub mod codec;
 pub mod enlarge_state;
 pub mod enlarged;
@@ -101,7 +102,7 @@ macro_rules! named {
         }
     )*};
 }
-named!(u8 => uint8, u16 => uint16, u32 => uint32, i32 => int32, f16 => float16, f32 => float32, f64 => float64);
+named!(i8 => int8, u8 => uint8, i16 => int16, u16 => uint16, u32 => uint32, i32 => int32, f16 => float16, f32 => float32, f64 => float64);
 
 /// The Zarr data type of samples.
 fn data_type_of(sample_type: SampleType) -> DataType {

@@ -1,6 +1,6 @@
 //! The model store: what the analysis of a measurement leaves, everything an evaluator needs.
 //!
-//! Each stage (`tile`, `cluster`, `normals`, `fit`) writes its arrays and then, last, its entry in
+//! Each stage (`tile`, `cluster`, `normals`, `fit`, `appearance`) writes its arrays and then, last, its entry in
 //! the attributes: arrays without their entry are the remains of a run that was killed.
 
 use std::ops::Range;
@@ -9,11 +9,13 @@ use std::path::Path;
 use btfkit_formats::Samples;
 use serde_json::{Map, Value, json};
 
+use crate::coherent::Appearance;
 use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
 use crate::mrf::Surface;
 use crate::run::recipe;
 use crate::shape::Size;
+use crate::store::appearance::{self, AppearanceReport};
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
 use crate::store::{Layout, Lock, Named, Store};
@@ -35,6 +37,8 @@ pub enum Stage {
     Normals,
     /// Fit the random field.
     Fit,
+    /// How the exemplar looks, for the coherent rule.
+    Appearance,
 }
 
 impl Stage {
@@ -45,25 +49,30 @@ impl Stage {
             Self::Cluster => "cluster",
             Self::Normals => "normals",
             Self::Fit => "fit",
+            Self::Appearance => "appearance",
         }
     }
 
     /// Its arrays; `report` is that of the stage.
     fn arrays(self, report: Option<&Value>) -> Vec<String> {
-        let fixed: &[&str] = match self {
-            Self::Tile => {
-                &["tile_source", "view_direction", "light_direction", "view_triangles", "light_triangles"]
-            }
-            Self::Cluster => &["index", "centres", "representatives", "representative_texel", "distance"],
-            Self::Normals => &["normals"],
-            Self::Fit => &["mrf/mean"],
-        };
         let levels =
             report.and_then(|report| report.get("levels")).and_then(Value::as_array).map_or(0, Vec::len);
-        let of_level = |level: usize| {
-            ["gamma", "sigma", "neighbourhood"].map(|name| format!("mrf/level_{level}/{name}"))
-        };
-        fixed.iter().map(|&name| name.to_owned()).chain((0..levels).flat_map(of_level)).collect()
+        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+        match self {
+            Self::Tile => names(&[
+                "tile_source",
+                "view_direction",
+                "light_direction",
+                "view_triangles",
+                "light_triangles",
+            ]),
+            Self::Cluster => {
+                names(&["index", "centres", "representatives", "representative_texel", "distance"])
+            }
+            Self::Normals => names(&["normals"]),
+            Self::Fit => field::arrays(levels),
+            Self::Appearance => appearance::arrays(levels),
+        }
     }
 }
 
@@ -111,10 +120,13 @@ impl Model {
         Ok(entry.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned())
     }
 
-    /// Digest of all that an enlargement depends on.
-    pub fn digest(&self) -> Result<String> {
-        let [cluster, fit] = [self.stage_digest(Stage::Cluster)?, self.stage_digest(Stage::Fit)?];
-        Ok(recipe::digest(&json!({"cluster": cluster, "fit": fit})))
+    /// Digest of some stages together.
+    pub fn digest_of(&self, stages: &[Stage]) -> Result<String> {
+        let digests: Map<String, Value> = stages
+            .iter()
+            .map(|&stage| Ok((stage.name().to_owned(), json!(self.stage_digest(stage)?))))
+            .collect::<Result<_>>()?;
+        Ok(recipe::digest(&Value::Object(digests)))
     }
 
     /// Begins a stage and holds it against other processes; none where it is done by this recipe and
@@ -231,13 +243,12 @@ impl Model {
         let count = self.clusters()?;
         let [views, lights] = self.directions()?;
         let brdf = [views.len(), lights.len()];
-        let (_, centres) = self.store.read::<u8>("centres", &[count, brdf[0], brdf[1]])?;
         let (_, sources) = self.store.read::<u32>("representative_texel", &[count, 2])?;
         Ok(Clusters {
             size: self.tile()?.size,
             index: self.index()?,
             brdf,
-            centres,
+            centres: self.centres()?,
             representatives: self.representatives()?,
             sources: sources.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
             distance: self.distance()?,
@@ -354,6 +365,23 @@ impl Model {
     /// Writes the random field model under `mrf/`.
     pub fn write_surface(&self, surface: &Surface) -> Result<()> {
         field::write(&self.store, surface)
+    }
+
+    /// Writes how the exemplar looks.
+    pub fn write_appearance(&self, appearance: &Appearance) -> Result<()> {
+        appearance::write(&self.store, appearance)
+    }
+
+    /// How the exemplar looks.
+    pub fn appearance(&self) -> Result<Appearance> {
+        let report: AppearanceReport = self.report(Stage::Appearance)?;
+        appearance::read(&self.store, &report, self.tile()?.size, self.clusters()?)
+    }
+
+    /// L* codes of the clusters' centres, [cluster, view, light].
+    pub fn centres(&self) -> Result<Vec<u8>> {
+        let [views, lights] = self.directions()?;
+        Ok(self.store.read::<u8>("centres", &[self.clusters()?, views.len(), lights.len()])?.1)
     }
 
     /// The random field model.

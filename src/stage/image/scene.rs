@@ -246,7 +246,9 @@ fn model_of(enlarged: &Enlarged, options: &Options) -> Result<Model> {
         None => beside(&options.source, &text(attributes.get("model_name"))),
     };
     let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
-    if text(attributes.get("recipe").and_then(|recipe| recipe.get("model"))) != model.digest()? {
+    if text(attributes.get("recipe").and_then(|recipe| recipe.get("model")))
+        != model.digest_of(enlarged.method()?.stages())?
+    {
         return Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
             options.source.display(),

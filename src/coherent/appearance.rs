@@ -1,0 +1,97 @@
+//! What a model stores for the coherent rule: how texels of the exemplar look, as small whole numbers.
+
+use crate::coherent::lattice::WaveCounts;
+use crate::error::{Error, Result};
+use crate::shape::{Size, Window};
+
+/// Features of a cluster.
+pub const FEATURES: usize = 8;
+
+/// Numbers that a basis reduces: the features of the 3 x 3 texels around one, a spacing apart.
+pub const INPUTS: usize = 9 * FEATURES;
+
+/// Numbers that a texel's surroundings are reduced to, but at the two coarsest levels.
+pub const FINE_DIMS: usize = 4;
+
+/// The same at the two coarsest levels, which decide what lies where.
+pub const COARSE_DIMS: usize = 8;
+
+/// Most levels, and longest side of an exemplar: so that all sums fit 32 bits.
+pub const LEVELS_MOST: usize = 13;
+/// Longest side of an exemplar.
+pub const MOST_SIDE: usize = 32767;
+
+/// A jitter of a whole spacing.
+pub const JITTER_ONE: u32 = 256;
+
+/// Number of levels of an exemplar: its shorter side holds at least four of the coarsest spacing.
+pub fn levels_of(exemplar: Size) -> usize {
+    let side = exemplar.height.min(exemplar.width);
+    (side / 4).max(1).ilog2() as usize + 1
+}
+
+/// Numbers that a texel's surroundings are reduced to at a level.
+pub fn dims_of(level: usize, levels: usize) -> usize {
+    if level + 2 >= levels { COARSE_DIMS } else { FINE_DIMS }
+}
+
+/// How the texels of an exemplar look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Appearance {
+    /// The part of the tile that is the exemplar.
+    pub exemplar: Window,
+    /// Whether its borders join.
+    pub wraps: bool,
+    /// Features of each cluster.
+    pub features: Vec<[i8; FEATURES]>,
+    /// How a level's appearance is made of features; of 2^k texels' spacing the k-th.
+    pub levels: Vec<Basis>,
+    /// The lattice of a regular material.
+    pub lattice: WaveCounts,
+}
+
+/// How surroundings are reduced to a level's appearance: `(sum of weights * inputs - offset) / 2^shift`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Basis {
+    /// Numbers that come out.
+    pub dims: usize,
+    /// [input, dim], inputs row by row of the 3 x 3 surroundings, features innermost.
+    pub weights: Vec<i16>,
+    /// [dim].
+    pub offset: Vec<i32>,
+    /// From 1 to 20.
+    pub shift: u32,
+}
+
+impl Appearance {
+    /// Checks that the parts fit each other and a tile; what comes from a store is not trusted.
+    ///
+    /// # Errors
+    /// Names the part, what was found and what was expected.
+    pub fn check(&self, tile: Size) -> Result<()> {
+        let Window { size, .. } = self.exemplar;
+        let refused = |what: String| Err(Error::input(format!("appearance: {what}")));
+        if !self.exemplar.fits(tile) || size.texels() == 0 || size.height.max(size.width) > MOST_SIDE {
+            return refused(format!(
+                "got the exemplar {}, expected a part of the tile of {tile}, at most {MOST_SIDE} texels a side",
+                self.exemplar
+            ));
+        }
+        let levels = levels_of(size);
+        if self.levels.len() != levels || levels > LEVELS_MOST {
+            return refused(format!("got {} levels, expected {levels} for {size}", self.levels.len()));
+        }
+        for (number, basis) in self.levels.iter().enumerate() {
+            let dims = dims_of(number, levels);
+            let fits =
+                basis.dims == dims && basis.weights.len() == INPUTS * dims && basis.offset.len() == dims;
+            if !fits || !(1..=20).contains(&basis.shift) {
+                return refused(format!(
+                    "level {number}: got {} dimensions and a shift of {}, expected {dims} and 1 to 20",
+                    basis.dims, basis.shift
+                ));
+            }
+        }
+        self.lattice.check(size)
+    }
+}

@@ -1,0 +1,113 @@
+//! Appearance of every texel at one level, made of whole numbers from features and a basis.
+
+use rayon::prelude::*;
+
+use crate::coherent::appearance::{Basis, FEATURES, INPUTS};
+use crate::shape::Size;
+
+/// Largest absolute value of an appearance: squared differences of threefold ones then stay below 2^24 in sum.
+const MOST: i32 = 120;
+
+/// Features of the texels, blurred as the levels become coarser.
+pub(super) struct Features {
+    size: Size,
+    /// Sixteen times the features, [y, x].
+    values: Vec<[i16; FEATURES]>,
+}
+
+impl Features {
+    pub(super) fn new(size: Size, features: impl Iterator<Item = [i8; FEATURES]>) -> Self {
+        Self { size, values: features.map(|texel| texel.map(|value| 16 * i16::from(value))).collect() }
+    }
+
+    /// Blurs from the level of spacing `spacing` to the next coarser one: [1 2 1] / 4 along the columns of each row,
+    /// then along the rows, `spacing` apart, wrapped.
+    pub(super) fn blur(&mut self, spacing: usize) {
+        let Size { height, width } = self.size;
+        let weigh = |before: [i16; FEATURES], here: [i16; FEATURES], after: [i16; FEATURES]| {
+            std::array::from_fn(|n| {
+                ((i32::from(before[n]) + 2 * i32::from(here[n]) + i32::from(after[n]) + 2) >> 2) as i16
+            })
+        };
+        let down = |y: usize| (y + spacing) % height;
+        let up = |y: usize| (y + height - spacing % height) % height;
+        let mut blurred = vec![[0; FEATURES]; self.values.len()];
+        blurred.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
+            let row = |y: usize| &self.values[y * width..(y + 1) * width];
+            let (above, here, below) = (row(up(y)), row(y), row(down(y)));
+            for (x, out) in out.iter_mut().enumerate() {
+                *out = weigh(above[x], here[x], below[x]);
+            }
+        });
+        self.values.par_chunks_mut(width).zip(blurred.par_chunks(width)).for_each(|(out, row)| {
+            for (x, out) in out.iter_mut().enumerate() {
+                *out = weigh(row[(x + width - spacing % width) % width], row[x], row[(x + spacing) % width]);
+            }
+        });
+    }
+
+    /// The features of the 3 x 3 texels around one, `spacing` apart, wrapped.
+    #[inline]
+    pub(super) fn surroundings(&self, spacing: usize, y: usize, x: usize) -> [i16; INPUTS] {
+        let Size { height, width } = self.size;
+        let rows = [(y + height - spacing % height) % height, y, (y + spacing) % height];
+        let columns = [(x + width - spacing % width) % width, x, (x + spacing) % width];
+        let mut inputs = [0; INPUTS];
+        for (n, input) in inputs.chunks_exact_mut(FEATURES).enumerate() {
+            input.copy_from_slice(&self.values[rows[n / 3] * width + columns[n % 3]]);
+        }
+        inputs
+    }
+
+    /// Rows and columns.
+    pub(super) fn size(&self) -> Size {
+        self.size
+    }
+}
+
+/// Appearance of every texel of the exemplar at a level, with a margin of the level's spacing on every side that wraps.
+pub(super) struct Level<const D: usize> {
+    /// Spacing h of the level in texels.
+    pub(super) spacing: usize,
+    /// Texels of a row, margins included.
+    pub(super) stride: usize,
+    /// [y + h, x + h].
+    pub(super) values: Vec<[i8; D]>,
+}
+
+impl<const D: usize> Level<D> {
+    pub(super) fn new(features: &Features, basis: &Basis, spacing: usize) -> Self {
+        let Size { height, width } = features.size();
+        let mut plain = vec![[0i8; D]; height * width];
+        plain.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, out) in row.iter_mut().enumerate() {
+                *out = project(&features.surroundings(spacing, y, x), basis);
+            }
+        });
+        let stride = width + 2 * spacing;
+        let wrapped = |place: usize, side: usize| (place + side - spacing % side) % side;
+        let mut values = vec![[0i8; D]; stride * (height + 2 * spacing)];
+        values.par_chunks_mut(stride).enumerate().for_each(|(y, row)| {
+            let from = &plain[wrapped(y, height) * width..][..width];
+            for (x, out) in row.iter_mut().enumerate() {
+                *out = from[wrapped(x, width)];
+            }
+        });
+        Self { spacing, stride, values }
+    }
+}
+
+/// Reduces surroundings by a basis. Sums wrap, so that no basis can break them; a fitted one never makes them wrap.
+#[inline]
+fn project<const D: usize>(inputs: &[i16; INPUTS], basis: &Basis) -> [i8; D] {
+    let mut sums = [0i32; D];
+    for (&input, weights) in inputs.iter().zip(basis.weights.chunks_exact(D)) {
+        for (sum, &weight) in sums.iter_mut().zip(weights) {
+            *sum = sum.wrapping_add(i32::from(input) * i32::from(weight));
+        }
+    }
+    std::array::from_fn(|n| {
+        let sum = sums[n].wrapping_sub(basis.offset[n]).wrapping_add(1 << (basis.shift - 1));
+        (sum >> basis.shift).clamp(-MOST, MOST) as i8
+    })
+}

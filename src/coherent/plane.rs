@@ -1,0 +1,310 @@
+//! The endless plane: any window of it, alone.
+
+use crate::coherent::appearance::{Appearance, JITTER_ONE, dims_of};
+use crate::coherent::level::{Features, Level};
+use crate::coherent::start::Start;
+use crate::error::{Error, Result};
+use crate::kernel::Kernel;
+use crate::kernel::coherent::{Repetition, Subpass, correct_coarse, correct_fine, unpack};
+use crate::shape::{Size, Window};
+
+/// Order of the parities, (row, column), in which the sub-passes of a pass correct.
+const PARITIES: [[i64; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
+
+/// Levels, counted from the coarsest, at which repetition costs.
+const REPETITION_LEVELS: usize = 2;
+
+/// Cost of a site that comes from the same row or column: once the square of a deviation of the first dimension
+/// (127 / 4, three times over as sums are) in each of four neighbours.
+const REPETITION_COST: i32 = 9 * 4 * 32 * 32;
+
+/// Rows and columns around a region that one pass reaches, and two.
+const REACH: [[usize; 2]; 2] = [[6, 6], [10, 12]];
+
+/// Jitter where there is no lattice: half a spacing.
+const JITTER: u32 = JITTER_ONE / 2;
+
+/// Shorter side from which on the border of an exemplar that does not wrap is kept.
+const LEAST_BORDERED: usize = 8;
+
+/// Which of all planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variation {
+    /// Another seed gives another plane of the same material.
+    pub seed: u32,
+    /// How far positions are moved at each level, in units of 1 / 256 of its spacing, at most [`JITTER_ONE`]: more
+    /// copies less in one piece, and fits less well.
+    pub jitter: u32,
+    /// Size of an output that joins at its own borders; both sides multiples of [`Plane::period`].
+    pub wrap: Option<Size>,
+}
+
+/// An endless plane of the material.
+pub struct Plane {
+    tile_width: usize,
+    exemplar: Window,
+    wraps: bool,
+    lattice: crate::coherent::WaveCounts,
+    /// The finest first.
+    levels: Vec<Levelled>,
+    kernel: Kernel,
+}
+
+enum Levelled {
+    Fine(Level<4>),
+    Coarse(Level<8>),
+}
+
+/// A part of a level: place of its first texel, rows and columns.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Region {
+    y: i64,
+    x: i64,
+    size: Size,
+}
+
+impl Region {
+    fn grown(self, [rows, columns]: [usize; 2]) -> Self {
+        Self {
+            y: self.y - rows as i64,
+            x: self.x - columns as i64,
+            size: Size::new(self.size.height + 2 * rows, self.size.width + 2 * columns),
+        }
+    }
+
+    /// What covers it at the next coarser level.
+    fn coarser(self) -> Self {
+        let (y, x) = (self.y >> 1, self.x >> 1);
+        let end = |first: i64, extent: usize| ((first + extent as i64 - 1) >> 1) + 1;
+        let size = Size::new(
+            (end(self.y, self.size.height) - y) as usize,
+            (end(self.x, self.size.width) - x) as usize,
+        );
+        Self { y, x, size }
+    }
+
+    /// A value for each place, row by row.
+    pub(super) fn map<T>(&self, value: impl Fn([i64; 2]) -> T) -> Vec<T> {
+        let mut values = Vec::with_capacity(self.size.texels());
+        for y in self.y..self.y + self.size.height as i64 {
+            values.extend((self.x..self.x + self.size.width as i64).map(|x| value([y, x])));
+        }
+        values
+    }
+
+    /// Where a place lies in such values.
+    pub(super) fn at(&self, [y, x]: [i64; 2]) -> usize {
+        (y - self.y) as usize * self.size.width + (x - self.x) as usize
+    }
+}
+
+impl Plane {
+    /// Makes the levels of an appearance; `index` [y, x] is the tile's.
+    ///
+    /// # Errors
+    /// Parts that do not fit each other.
+    pub fn new(tile: Size, index: &[u16], appearance: &Appearance, kernel: Kernel) -> Result<Self> {
+        appearance.check(tile)?;
+        let exemplar = appearance.exemplar;
+        let mut texels = Vec::with_capacity(exemplar.size.texels());
+        for row in index.chunks_exact(tile.width).skip(exemplar.y).take(exemplar.size.height) {
+            for &cluster in &row[exemplar.x..exemplar.x + exemplar.size.width] {
+                texels.push(*appearance.features.get(usize::from(cluster)).ok_or_else(|| {
+                    Error::input(format!(
+                        "appearance: got features of {} clusters, the index has cluster {cluster}",
+                        appearance.features.len()
+                    ))
+                })?);
+            }
+        }
+        let mut features = Features::new(exemplar.size, texels.into_iter());
+        let count = appearance.levels.len();
+        let mut levels = Vec::with_capacity(count);
+        for (number, basis) in appearance.levels.iter().enumerate() {
+            let spacing = 1 << number;
+            levels.push(match dims_of(number, count) {
+                4 => Levelled::Fine(Level::new(&features, basis, spacing)),
+                _ => Levelled::Coarse(Level::new(&features, basis, spacing)),
+            });
+            if number + 1 < count {
+                features.blur(spacing);
+            }
+        }
+        let bordered = exemplar.size.height.min(exemplar.size.width) >= LEAST_BORDERED;
+        Ok(Self {
+            tile_width: tile.width,
+            exemplar,
+            wraps: appearance.wraps || !bordered,
+            lattice: appearance.lattice.clone(),
+            levels,
+            kernel,
+        })
+    }
+
+    /// The variation of a seed as it is by default.
+    pub fn variation(&self, seed: u32) -> Variation {
+        let jitter = if self.lattice.is_empty() { JITTER } else { 0 };
+        Variation { seed, jitter, wrap: None }
+    }
+
+    /// Sides of an output that joins at its own borders are multiples of this.
+    pub fn period(&self) -> usize {
+        1 << self.levels.len()
+    }
+
+    /// Source texels of a window: for each of its texels, row by row, `row * width + column` of the tile's texel that it
+    /// is. `y` and `x` are the window's first row and column, negative ones too.
+    ///
+    /// # Errors
+    /// A jitter above [`JITTER_ONE`], and an output that wraps whose sides are no multiples of [`Plane::period`].
+    pub fn window(&self, variation: &Variation, y: i64, x: i64, size: Size) -> Result<Vec<u32>> {
+        self.check(variation)?;
+        let window = Region { y, x, size };
+        // The regions that are needed of each level, the finest first.
+        let mut regions: Vec<Region> = Vec::with_capacity(self.levels.len());
+        for level in 0..self.levels.len() {
+            let wanted = regions.last().map_or(window, |finer: &Region| finer.coarser());
+            regions.push(wanted.grown(self.halo(level)));
+        }
+        let start = Start {
+            exemplar: self.exemplar.size,
+            lattice: &self.lattice,
+            seed: variation.seed,
+            jitter: variation.jitter,
+            wrap: variation.wrap,
+        };
+        let mut positions = Vec::new();
+        for level in (0..self.levels.len()).rev() {
+            let region = &regions[level];
+            positions = match regions.get(level + 1) {
+                None => start.begin(level as u32, region),
+                Some(coarser) => start.finer(level as u32, region, &positions, coarser),
+            };
+            if level == 0 && !self.wraps {
+                start.reflect(&mut positions);
+            }
+            self.correct(level, region, &mut positions);
+        }
+        let Some(finest) = regions.first() else { return Ok(Vec::new()) };
+        Ok(window.map(|place| self.source(positions[finest.at(place)])))
+    }
+
+    /// Bytes that the levels take in memory.
+    pub fn bytes(&self) -> u64 {
+        let level = |level: &Levelled| match level {
+            Levelled::Fine(level) => size_of_val(&level.values[..]),
+            Levelled::Coarse(level) => size_of_val(&level.values[..]),
+        };
+        self.levels.iter().map(level).sum::<usize>() as u64
+    }
+
+    /// Checks a variation, as [`Plane::window`] does.
+    ///
+    /// # Errors
+    /// Those of [`Plane::window`].
+    pub fn check(&self, variation: &Variation) -> Result<()> {
+        if variation.jitter > JITTER_ONE {
+            return Err(Error::usage(format!(
+                "got a jitter of {} / 256, expected at most 1",
+                variation.jitter
+            )));
+        }
+        let period = self.period();
+        match variation.wrap {
+            Some(size) if !size.height.is_multiple_of(period) || !size.width.is_multiple_of(period) => {
+                let near = |side: usize| side.next_multiple_of(period);
+                Err(Error::usage(format!(
+                    "an output of {size} cannot join at its own borders: expected sides that are multiples of {period}"
+                ))
+                .hint(format!("such as {}", Size::new(near(size.height), near(size.width)))))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The tile's texel at a position of the exemplar.
+    fn source(&self, position: u32) -> u32 {
+        let [y, x] = unpack(position).map(|place| place as usize);
+        ((self.exemplar.y + y) * self.tile_width + self.exemplar.x + x) as u32
+    }
+
+    fn passes(level: usize) -> usize {
+        if level == 0 { 1 } else { 2 }
+    }
+
+    fn resists_repetition(&self, level: usize) -> bool {
+        level + REPETITION_LEVELS >= self.levels.len()
+    }
+
+    /// Sides of the exemplar in texels of a level.
+    fn sides_at(&self, level: usize) -> [usize; 2] {
+        let Size { height, width } = self.exemplar.size;
+        [height, width].map(|side| (side + (1 << level) / 2) >> level)
+    }
+
+    /// Rows and columns around a region that its correction depends on.
+    fn halo(&self, level: usize) -> [usize; 2] {
+        let passes = Self::passes(level);
+        if self.resists_repetition(level) {
+            self.sides_at(level).map(|side| passes * (side + 6))
+        } else {
+            REACH[passes - 1]
+        }
+    }
+
+    /// Corrects the positions of a level; those in the halo come out as whatever they do.
+    fn correct(&self, level: usize, region: &Region, positions: &mut [u32]) {
+        let Size { height, width } = region.size;
+        let repeats = self.resists_repetition(level);
+        let distance = self.sides_at(level);
+        let margin = if repeats { distance.map(|side| (side + 1).max(2)) } else { [2, 2] };
+        for _ in 0..Self::passes(level) {
+            let before = if repeats { positions.to_vec() } else { Vec::new() };
+            let repetition =
+                repeats.then_some(Repetition { before: &before, distance, cost: REPETITION_COST });
+            for parity in PARITIES {
+                let first = |place: i64, parity: i64, margin: usize| {
+                    margin + ((parity - place - margin as i64) & 1) as usize
+                };
+                let rows = [first(region.y, parity[0], margin[0]), height.saturating_sub(margin[0])];
+                let columns = [first(region.x, parity[1], margin[1]), width.saturating_sub(margin[1])];
+                let sides = [self.exemplar.size.height, self.exemplar.size.width];
+                let crosses_border = level > 0 || self.wraps;
+                match &self.levels[level] {
+                    Levelled::Fine(level) => {
+                        let appearance = &level.values;
+                        let (stride, spacing) = (level.stride, level.spacing);
+                        let subpass = Subpass {
+                            width,
+                            rows,
+                            columns,
+                            appearance,
+                            stride,
+                            spacing,
+                            sides,
+                            crosses_border,
+                            repetition,
+                        };
+                        correct_fine(self.kernel, positions, subpass);
+                    }
+                    Levelled::Coarse(level) => {
+                        let appearance = &level.values;
+                        let (stride, spacing) = (level.stride, level.spacing);
+                        let subpass = Subpass {
+                            width,
+                            rows,
+                            columns,
+                            appearance,
+                            stride,
+                            spacing,
+                            sides,
+                            crosses_border,
+                            repetition,
+                        };
+                        correct_coarse(self.kernel, positions, subpass);
+                    }
+                }
+            }
+        }
+    }
+}

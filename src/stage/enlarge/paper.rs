@@ -1,0 +1,196 @@
+//! The paper's rule: synthesise normals row by row, find each one's nearest normals of the tile, choose by (25). Rows
+//! flow through; memory is some bands and a row of shards.
+
+use serde_json::{Map, Value, json};
+
+use super::pipeline::{Band, Chooser, Pipeline, Source};
+use super::{Output, Rule, Subject, Units};
+use crate::error::{Error, Result};
+use crate::kernel::Kernel;
+use crate::mrf::{Extent, Surface, Synthesis};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::run::recipe;
+use crate::shape::{Size, Window};
+use crate::stage::import::Shard;
+use crate::store::enlarge_state::EnlargeState;
+use crate::store::enlarged::{Description, Enlarged, Method, SHARD_SIDE, Texels};
+use crate::texel::nearest::NearestNormals;
+use crate::texel::scan::Scan;
+
+/// Bytes of a band of normals and candidates, unless its rows are given. Small, so that the stations of the pipeline
+/// are soon all at work, and a band is still in a cache when the next station takes it.
+const BAND_BYTES: usize = 2 << 20;
+
+/// Bands on their way at a time.
+const BANDS: usize = 3;
+
+/// Settings of the paper's rule.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Number of nearest normals that are candidates, n_k.
+    pub candidates: usize,
+    /// Write the synthesised normals too.
+    pub keep_normals: bool,
+    /// Rows whose candidates are sought at a time; as many as fit 2 MiB where absent. Changes no byte.
+    pub band_rows: Option<usize>,
+}
+
+/// The paper's rule on a model.
+pub(super) struct Paper {
+    options: Options,
+    surface: Surface,
+    /// Bytes that the field takes.
+    field_bytes: u64,
+}
+
+/// What all outputs share.
+struct Shared {
+    nearest: NearestNormals,
+    scan: Scan,
+    kernel: Kernel,
+}
+
+impl Paper {
+    pub(super) fn open(subject: &Subject, options: &Options) -> Result<Self> {
+        if !(1..=subject.tile.texels()).contains(&options.candidates) {
+            return Err(Error::usage(format!(
+                "{} candidates were asked for, expected 1 to {} for this tile",
+                options.candidates,
+                subject.tile.texels()
+            )));
+        }
+        if subject.options.shard != Shard::WHOLE {
+            return Err(Error::usage(
+                "the paper's rule goes from the top down and cannot be made in parts by --shard",
+            )
+            .hint("leave out --shard, or choose --method coherent"));
+        }
+        let surface = subject.model.surface()?;
+        let Size { height, width } = subject.options.size;
+        let field_bytes = Synthesis::memory_bytes(&surface.field, height, width, extent(subject))?;
+        Ok(Self { options: options.clone(), surface, field_bytes })
+    }
+
+    fn band_rows(&self, width: usize) -> usize {
+        let row_bytes = Band::row_bytes(width, self.options.candidates);
+        self.options.band_rows.unwrap_or(BAND_BYTES / row_bytes).clamp(1, SHARD_SIDE)
+    }
+
+    /// Makes one output.
+    fn make_one(
+        &self,
+        subject: &Subject,
+        output: &Output,
+        shared: &Shared,
+        context: &Context<'_>,
+    ) -> Result<Units> {
+        let Options { candidates, keep_normals, .. } = self.options;
+        let super::Options { size, tileable, .. } = subject.options;
+        let Size { height, width } = size;
+        let digest = recipe::digest(&output.recipe);
+        let mut field =
+            Synthesis::new(&self.surface.field, output.seed, height, width, extent(subject), shared.kernel)?;
+        let description =
+            Description { size, clusters: subject.clusters.clusters, source: None, keep_normals };
+        let store = Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model)?;
+        let state = EnlargeState::read(&output.path, &digest)?;
+        let shard_rows = store.shards().height;
+        let found = match &state {
+            Some(state) => state.shard_rows,
+            None if store.is_whole() => shard_rows,
+            None => 0,
+        };
+        let units = Units { found, written: shard_rows.saturating_sub(found) };
+        if units.written == 0 {
+            EnlargeState::remove(&output.path)?;
+            return Ok(units);
+        }
+        if let Some(state) = &state {
+            field.restore(&state.field).map_err(|error| error.context(output.path.display()))?;
+        }
+        let done = found * SHARD_SIDE;
+        let stored_row = |y: usize| store.read(Window { y, x: 0, size: Size::new(1, width) });
+        let shard_texels = SHARD_SIDE.min(height) * width;
+        let band_rows = self.band_rows(width);
+        let source = Source { surface: &self.surface, field, height, width, band_rows };
+        let chooser = Chooser {
+            scan: &shared.scan,
+            height,
+            width,
+            keep_normals,
+            above: (done > 0).then(|| stored_row(done - 1)).transpose()?,
+            first: (tileable && done > 0).then(|| stored_row(0)).transpose()?,
+            wraps: tileable,
+            row: done,
+            index: Vec::with_capacity(shard_texels),
+            normals: Vec::with_capacity(if keep_normals { 3 * shard_texels } else { 0 }),
+        };
+        let mut pipeline = Pipeline::new(source, &shared.nearest, chooser, candidates);
+        context.progress.begin("enlarge", size.texels() as u64, Counted::Items("texels"));
+        context.progress.advance((done * width) as u64);
+        while let Some((rows, completed)) = context.install(|| pipeline.step())? {
+            if let Some(row) = completed {
+                let y = row.number * SHARD_SIDE;
+                let window = Window { y, x: 0, size: Size::new(row.index.len() / width, width) };
+                let texels = Texels { index: &row.index, source: &[], normals: &row.normals };
+                context.install(|| store.write(window, texels))?;
+                let state = EnlargeState { shard_rows: row.number + 1, field: row.state };
+                state.write(&output.path, &digest)?;
+            }
+            context.progress.advance((rows * width) as u64);
+            context.check_stop()?;
+        }
+        EnlargeState::remove(&output.path)?;
+        context.progress.end();
+        Ok(units)
+    }
+}
+
+impl Rule for Paper {
+    fn method(&self) -> Method {
+        Method::Paper
+    }
+
+    fn units(&self, subject: &Subject) -> (&'static str, usize) {
+        ("row of shards", subject.options.size.height.div_ceil(SHARD_SIDE))
+    }
+
+    fn recipe(&self) -> Map<String, Value> {
+        let Options { candidates, keep_normals, .. } = self.options;
+        let settings = [("candidates", json!(candidates)), ("keep_normals", json!(keep_normals))];
+        settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+
+    /// Bands, a row of shards, the field, and what belongs to the tile.
+    fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
+        let Options { candidates, keep_normals, .. } = self.options;
+        let Size { height, width } = subject.options.size;
+        let bands = BANDS * self.band_rows(width) * Band::row_bytes(width, candidates);
+        let texel_bytes = size_of::<u16>() + if keep_normals { size_of::<[f32; 3]>() } else { 0 };
+        let shards = SHARD_SIDE.min(height) * width * texel_bytes;
+        let clusters = subject.clusters.clusters;
+        let tile = NearestNormals::most_bytes(subject.tile.texels()) + clusters * clusters * size_of::<f32>();
+        (bands + shards + tile) as u64 + self.field_bytes
+    }
+
+    fn advice(&self) -> &'static str {
+        "choose a lower --band, a larger --memory or a smaller width, or leave out --keep-normals"
+    }
+
+    fn make(&self, subject: &Subject, outputs: &[Output], context: &Context<'_>) -> Result<Vec<Units>> {
+        // All that can fail for the model's sake comes before an output is begun.
+        let kernel = Kernel::fastest();
+        let normals = subject.model.normals()?;
+        let shared = Shared {
+            nearest: context.install(|| NearestNormals::new(&normals, self.options.candidates, kernel)),
+            scan: Scan::new(subject.model.index()?, &subject.model.distance()?),
+            kernel,
+        };
+        outputs.iter().map(|output| self.make_one(subject, output, &shared, context)).collect()
+    }
+}
+
+fn extent(subject: &Subject) -> Extent {
+    if subject.options.tileable { Extent::Wrapping } else { Extent::Endless }
+}

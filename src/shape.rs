@@ -75,17 +75,52 @@ impl FromStr for Window {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let area: Area = text.parse()?;
+        area.within_first_quadrant().ok_or_else(|| format!("expected x and y of at least 0, got {text:?}"))
+    }
+}
+
+/// A rectangle of an endless plane, whose top left corner may have negative coordinates. Written `x,y,width,height`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// Topmost row.
+    pub y: i64,
+    /// Leftmost column.
+    pub x: i64,
+    /// Extent.
+    pub size: Size,
+}
+
+/// Longest side of an area, and largest coordinate: what 32-bit whole numbers address.
+const AREA_MOST: i64 = 1 << 31;
+
+impl Area {
+    /// The window that it is of a plane that begins at row 0 and column 0.
+    pub fn within_first_quadrant(self) -> Option<Window> {
+        let place = |place: i64| usize::try_from(place).ok();
+        Some(Window { y: place(self.y)?, x: place(self.x)?, size: self.size })
+    }
+}
+
+impl FromStr for Area {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
         let expected = || format!("expected x,y,width,height such as 0,0,512,512, got {text:?}");
-        let numbers: Vec<usize> = text
+        let numbers: Vec<i64> = text
             .split(',')
             .map(|part| part.trim().parse())
             .collect::<Result<_, _>>()
             .map_err(|_| expected())?;
-        match numbers[..] {
-            [x, y, width, height] if width > 0 && height > 0 => {
-                Ok(Self { y, x, size: Size { height, width } })
-            }
-            _ => Err(expected()),
+        let &[x, y, width, height] = numbers.as_slice() else { return Err(expected()) };
+        let is_side = |side: i64| (1..=AREA_MOST).contains(&side);
+        let is_place = |first: i64, side: i64| first >= -AREA_MOST && first <= AREA_MOST - side;
+        if !is_side(width) || !is_side(height) {
+            return Err(expected());
         }
+        if !is_place(x, width) || !is_place(y, height) {
+            return Err(format!("expected places from -2^31 to 2^31 - 1, got {text:?}"));
+        }
+        Ok(Self { y, x, size: Size { height: height as usize, width: width as usize } })
     }
 }

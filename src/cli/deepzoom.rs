@@ -1,12 +1,13 @@
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::stage::deepzoom::{self, Encoding};
-use btfkit_formats::Direction;
+use btfkit::stage::image::Subject;
 use clap::{Args, ValueEnum};
 
 use super::Tell;
+use super::scene::SceneArgs;
 
 /// JPEG quality of tiles, unless one is given.
 const QUALITY: u8 = 90;
@@ -18,18 +19,8 @@ pub(super) struct Deepzoom {
     /// A picture as a pyramid of tiles: NAME.dzi, NAME_files, and a viewer NAME.html
     #[arg(long)]
     deepzoom: bool,
-    /// Light: theta,phi in degrees; phi counter-clockwise from the right
-    #[arg(long, default_value = "15,0")]
-    light: Direction,
-    /// View: theta,phi in degrees
-    #[arg(long, default_value = "0,0")]
-    view: Direction,
-    /// Factor on the linear values
-    #[arg(long, default_value_t = 1.0)]
-    exposure: f64,
-    /// The model of an enlarged index [default: beside it, under the name it had]
-    #[arg(long)]
-    model: Option<PathBuf>,
+    #[command(flatten)]
+    scene: SceneArgs,
     /// Format of the tiles
     #[arg(long, value_enum, default_value = "png")]
     format: TileFormat,
@@ -67,20 +58,22 @@ impl Deepzoom {
         context: &Context<'_>,
         tell: Tell,
     ) -> Result<()> {
-        let plan = deepzoom::plan(&deepzoom::Options {
-            source: source.to_owned(),
-            model: self.model.clone(),
-            view: self.view,
-            light: self.light,
-            exposure: self.exposure,
-            output: output.to_owned(),
-            encoding: match self.format {
-                TileFormat::Png => Encoding::Png,
-                TileFormat::Jpeg => Encoding::Jpeg(quality.unwrap_or(QUALITY)),
+        let plan = deepzoom::plan(
+            &deepzoom::Options {
+                picture: self
+                    .scene
+                    .options(source, Subject::Appearance { view: self.scene.view, light: self.scene.light }),
+                exposure: self.scene.exposure,
+                output: output.to_owned(),
+                encoding: match self.format {
+                    TileFormat::Png => Encoding::Png,
+                    TileFormat::Jpeg => Encoding::Jpeg(quality.unwrap_or(QUALITY)),
+                },
+                tile_side: self.tile_size,
+                overlap: self.overlap,
             },
-            tile_side: self.tile_size,
-            overlap: self.overlap,
-        })?;
+            context,
+        )?;
         if self.dry_run {
             return tell.plan(&plan.summary(context));
         }

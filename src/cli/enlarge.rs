@@ -129,7 +129,7 @@ impl Enlarge {
 }
 
 /// A number from 0 to 1.
-fn jitter(text: &str) -> std::result::Result<f64, String> {
+pub(super) fn jitter(text: &str) -> std::result::Result<f64, String> {
     let number = text.trim().parse::<f64>().ok().filter(|number| (0.0..=1.0).contains(number));
     number.ok_or_else(|| format!("expected a number from 0 to 1, got {text:?}"))
 }

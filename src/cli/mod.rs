@@ -14,6 +14,7 @@ mod import;
 mod info;
 mod progress;
 mod sample;
+mod scene;
 mod source;
 mod table;
 mod verify;

@@ -14,7 +14,7 @@ pub const INPUTS: usize = 9 * FEATURES;
 pub const FINE_DIMS: usize = 4;
 
 /// The same at the two coarsest levels, which decide what lies where.
-pub const COARSE_DIMS: usize = 8;
+pub(super) const COARSE_DIMS: usize = 8;
 
 /// Most levels, and longest side of an exemplar: so that all sums fit 32 bits.
 pub const LEVELS_MOST: usize = 13;

@@ -75,14 +75,8 @@ impl Encoding {
 /// What to show, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A measurement, a model (its tile) or an enlarged index.
-    pub source: PathBuf,
-    /// The model of an enlarged index; beside it under its recorded name where absent.
-    pub model: Option<PathBuf>,
-    /// Where it is seen from.
-    pub view: Direction,
-    /// Where it is lit from.
-    pub light: Direction,
+    /// The picture; its subject is [`Subject::Appearance`].
+    pub picture: image::Options,
     /// Factor on the linear values.
     pub exposure: f64,
     /// The description to make, `NAME.dzi`; the tiles come into `NAME_files`, a viewer is `NAME.html`.
@@ -121,7 +115,7 @@ pub struct Report {
 ///
 /// # Errors
 /// Settings beyond their ranges, a source that cannot be pictured, and a place that is taken.
-pub fn plan(options: &Options) -> Result<Plan> {
+pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
     let (side, overlap) = (options.tile_side, options.overlap);
     if !TILE_SIDES.contains(&side) || overlap > side / 2 {
         return Err(Error::usage(format!(
@@ -131,19 +125,17 @@ pub fn plan(options: &Options) -> Result<Plan> {
         )));
     }
     let place = Place::new(&options.output, options.encoding)?;
-    let mut scene = Scene::open(&image::Options {
-        source: options.source.clone(),
-        model: options.model.clone(),
-        subject: Subject::Appearance { view: options.view, light: options.light },
-        window: None,
-    })?;
+    let Subject::Appearance { view, light } = options.picture.subject else {
+        return Err(Error::usage("a pyramid shows the material under a light, not its index or its normals"));
+    };
+    let mut scene = Scene::open(&options.picture, context)?;
     scene.expose(options.exposure);
     let direction = |direction: Direction| json!(direction.degrees());
     let recipe = json!({
         "stage": "deepzoom", "method": METHOD,
         "source": scene.recipe(),
-        "view": direction(options.view),
-        "light": direction(options.light),
+        "view": direction(view),
+        "light": direction(light),
         "exposure": options.exposure,
         "tiles": options.encoding.recipe(),
         "tile_side": side,
@@ -184,7 +176,7 @@ impl Plan {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
         let left = context.memory_bytes.saturating_sub(needed);
-        let bands = self.scene.bands(window, left).map_err(|_| {
+        let bands = self.scene.bands(left).map_err(|_| {
             Error::usage(format!(
                 "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
                 window.size.width,
@@ -200,10 +192,10 @@ impl Plan {
         if !self.is_whole() {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
             let mut pixels = vec![[0.0; 3]; window.size.width];
-            for part in bands {
+            for rows in bands {
                 context.check_stop()?;
-                let band = self.scene.read(part, context)?;
-                for row in 0..part.size.height {
+                let band = self.scene.read(rows.clone(), context)?;
+                for row in 0..rows.len() {
                     band.row(row, &mut pixels);
                     cascade.push(&self.pyramid, &pixels, &tiles)?;
                 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::picture::{Ending, Picture, stream};
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::shape::{Size, Window};
+use crate::shape::{Area, Size, Window};
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
 use crate::texel::evaluate::{Appearance, add};
@@ -41,14 +41,37 @@ pub enum Subject {
 /// What to picture.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A measurement, a model (its tile) or an enlarged index.
+    /// A measurement, a model (its tile, or an endless plane of it) or an enlarged index.
     pub source: PathBuf,
     /// The model of an enlarged index; beside it under its recorded name where absent.
     pub model: Option<PathBuf>,
     /// What to show.
     pub subject: Subject,
-    /// The part to show; all of it where absent.
-    pub window: Option<Window>,
+    /// Where the values of texels come from.
+    pub values: Values,
+    /// Of a model: the endless plane that the coherent rule makes of it, instead of its tile.
+    pub plane: Option<PlaneOptions>,
+    /// The part to show; all of it where absent. Only a plane has places below 0.
+    pub window: Option<Area>,
+}
+
+/// Where the values of texels come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Values {
+    /// The representatives of the clusters.
+    #[default]
+    Model,
+    /// The measurement itself, through the source of each texel; where it is not named, it lies beside the model.
+    Measured(Option<PathBuf>),
+}
+
+/// Which of a model's endless planes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlaneOptions {
+    /// Another seed gives another plane.
+    pub seed: u32,
+    /// See [`crate::coherent::Variation`]; by the model where absent.
+    pub jitter: Option<u32>,
 }
 
 /// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
@@ -58,25 +81,21 @@ pub struct Options {
 /// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
 pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<Size> {
     Ending::of(output)?;
-    let mut scene = Scene::open(options)?;
+    let mut scene = Scene::open(options, context)?;
     scene.expose(exposure);
-    let plane = scene.size();
-    let window = options.window.unwrap_or(plane.window());
-    if !window.fits(plane) {
-        return Err(Error::usage(format!("window {window} does not lie within {plane}")));
-    }
+    let size = scene.size();
     // Rows as values, bytes and packed bytes, and the file's buffers.
-    let writing = 32 * window.size.width as u64 + WRITING_BYTES;
-    let mut bands = scene.bands(window, context.memory_bytes.saturating_sub(writing))?;
-    context.progress.begin("image", window.size.height as u64, Counted::Items("rows"));
+    let writing = 32 * size.width as u64 + WRITING_BYTES;
+    let mut bands = scene.bands(context.memory_bytes.saturating_sub(writing))?;
+    context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let mut band: Option<(usize, usize, Band<'_>)> = None;
-    stream::write(output, window.size, scene.meaning(), |pixels| {
+    stream::write(output, size, scene.meaning(), |pixels| {
         let (next, rows, read) = match band.take() {
             Some(band) if band.0 < band.1 => band,
             _ => {
                 context.check_stop()?;
-                let window = bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
-                (0, window.size.height, scene.read(window, context)?)
+                let rows = bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
+                (0, rows.len(), scene.read(rows, context)?)
             }
         };
         read.row(next, pixels);
@@ -85,7 +104,7 @@ pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_
         Ok(())
     })?;
     context.progress.end();
-    Ok(window.size)
+    Ok(size)
 }
 
 /// The measurement itself, mixed between measured directions.

@@ -1,15 +1,23 @@
 //! What a picture is of, opened, and read band by band so that memory does not grow with its height.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::{Appearance, Options, Subject, cluster_colors, expect_colors, look_up, mixed};
+use super::{
+    Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, expect_colors, look_up, mixed,
+    of_measured_tile,
+};
+use crate::coherent::{Plane, Variation};
 use crate::color::Decoder;
 use crate::error::{Error, Result};
+use crate::kernel::Kernel;
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::Context;
-use crate::shape::{Size, Window};
+use crate::shape::{Area, Size};
+use crate::stage::cluster::open_measurement_of;
 use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
@@ -18,42 +26,74 @@ use crate::store::model::{self, Model, Stage};
 /// Rows of a measurement that are decoded together: a row of chunks.
 pub(super) const MEASUREMENT_ROWS: usize = 16;
 
+/// Rows and columns of an endless plane that are made at once: what lies around a window is made for nothing.
+const PLANE_SIDE: usize = 512;
+
+/// Memory of a texel of a plane while it is made.
+const PLANE_TEXEL_BYTES: usize = 24;
+
 /// A plane of pixels that can be read in parts.
 pub struct Scene {
     source: Source,
-    size: Size,
-    /// Digest of what lies at the source.
-    digest: String,
+    /// The part that is shown.
+    area: Area,
+    /// What tells its pixels apart from those of another source.
+    recipe: Value,
 }
 
 enum Source {
-    Measurement { measurement: Measurement, appearance: Appearance, decoder: Decoder },
+    Measurement {
+        measurement: Measurement,
+        appearance: Appearance,
+        decoder: Decoder,
+    },
     Tile(Picture),
-    Clusters { enlarged: Enlarged, colors: Vec<[f32; 3]> },
+    /// An enlarged index, by the colours of clusters.
+    Clusters {
+        enlarged: Enlarged,
+        colors: Vec<[f32; 3]>,
+    },
     Index(Enlarged),
     Normals(Enlarged),
+    /// An enlarged index, by the pixels of the tile's texels.
+    Sources {
+        enlarged: Enlarged,
+        tile: Picture,
+    },
+    /// An endless plane, by the pixels of the tile's texels.
+    Plane {
+        plane: Plane,
+        variation: Variation,
+        tile: Picture,
+    },
 }
 
-/// Pixels of some rows; those of clusters are looked up row by row, since their numbers take less memory.
+/// Pixels of some rows; looked up row by row, since numbers take less memory.
 pub struct Band<'a> {
     width: usize,
-    values: Values<'a>,
+    pixels: Pixels<'a>,
 }
 
-enum Values<'a> {
+enum Pixels<'a> {
     Clusters { index: Vec<u16>, colors: &'a [[f32; 3]] },
-    Pixels(Vec<[f32; 3]>),
+    Texels { source: Vec<u32>, tile: &'a [[f32; 3]] },
+    Own(Vec<[f32; 3]>),
 }
 
 impl Band<'_> {
     /// The pixels of a row of it.
     pub fn row(&self, row: usize, pixels: &mut [[f32; 3]]) {
         let range = row * self.width..(row + 1) * self.width;
-        match &self.values {
-            Values::Pixels(all) => pixels.copy_from_slice(&all[range]),
-            Values::Clusters { index, colors } => {
+        match &self.pixels {
+            Pixels::Own(all) => pixels.copy_from_slice(&all[range]),
+            Pixels::Clusters { index, colors } => {
                 for (pixel, &cluster) in pixels.iter_mut().zip(&index[range]) {
                     *pixel = colors[usize::from(cluster)];
+                }
+            }
+            Pixels::Texels { source, tile } => {
+                for (pixel, &texel) in pixels.iter_mut().zip(&source[range]) {
+                    *pixel = tile[texel as usize];
                 }
             }
         }
@@ -65,7 +105,7 @@ impl Scene {
     ///
     /// # Errors
     /// Where there is nothing, or nothing that can be pictured as asked for.
-    pub fn open(options: &Options) -> Result<Self> {
+    pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
         let attributes = Store::at(path).attributes()?.ok_or_else(|| {
             Error::missing(format!(
@@ -73,24 +113,59 @@ impl Scene {
                 path.display()
             ))
         })?;
-        let digest = attributes.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
-        match attributes.get("kind").and_then(Value::as_str) {
-            Some(measurement::KIND) => of_measurement(Measurement::open(path)?, options, digest),
-            Some(model::KIND) => of_tile(&Model::open(path)?, options),
-            Some(enlarged::KIND) => of_enlarged(Enlarged::open(path)?, options, digest),
-            kind => Err(Error::input(format!("{}: cannot picture a store of kind {kind:?}", path.display()))),
+        let digest = attributes.get("digest").cloned().unwrap_or_default();
+        let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
+        if options.plane.is_some() && kind != model::KIND {
+            return Err(Error::usage(format!(
+                "{}: an endless plane is made of a model, got a {kind}",
+                path.display()
+            )));
         }
+        let (source, size) = match (kind, options.plane) {
+            (measurement::KIND, _) => of_measurement(Measurement::open(path)?, options)?,
+            (model::KIND, None) => of_tile(&Model::open(path)?, options, context)?,
+            (model::KIND, Some(plane)) => return of_plane(&Model::open(path)?, options, plane, context),
+            (enlarged::KIND, _) => of_enlarged(Enlarged::open(path)?, options, context)?,
+            _ => {
+                return Err(Error::input(format!(
+                    "{}: cannot picture a store of kind {kind}",
+                    path.display()
+                )));
+            }
+        };
+        let whole = Area { y: 0, x: 0, size };
+        let area = options.window.unwrap_or(whole);
+        if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
+            let Area { x, y, size: part } = area;
+            return Err(Error::usage(format!(
+                "window {x},{y},{},{} does not lie within {size}",
+                part.width, part.height
+            )));
+        }
+        let digest = if kind == model::KIND {
+            json!(Model::open(path)?.stage_digest(Stage::Cluster)?)
+        } else {
+            digest
+        };
+        let mut recipe = json!({"kind": kind, "digest": digest, "size": [size.height, size.width]});
+        if area != whole {
+            recipe["window"] = json!([area.x, area.y, area.size.width, area.size.height]);
+        }
+        if options.values != Values::Model {
+            recipe["values"] = json!("measured");
+        }
+        Ok(Self { source, area, recipe })
     }
 
     /// Rows and columns.
     pub fn size(&self) -> Size {
-        self.size
+        self.area.size
     }
 
     /// What its values mean.
     pub fn meaning(&self) -> Meaning {
         match &self.source {
-            Source::Tile(picture) => picture.meaning,
+            Source::Tile(tile) | Source::Sources { tile, .. } | Source::Plane { tile, .. } => tile.meaning,
             Source::Index(_) | Source::Normals(_) => Meaning::Display,
             Source::Measurement { .. } | Source::Clusters { .. } => Meaning::Linear,
         }
@@ -98,12 +173,7 @@ impl Scene {
 
     /// What tells its pixels apart from those of another source, for a recipe.
     pub fn recipe(&self) -> Value {
-        let kind = match &self.source {
-            Source::Measurement { .. } => measurement::KIND,
-            Source::Tile(_) => model::KIND,
-            Source::Clusters { .. } | Source::Index(_) | Source::Normals(_) => enlarged::KIND,
-        };
-        json!({"kind": kind, "digest": self.digest, "size": [self.size.height, self.size.width]})
+        self.recipe.clone()
     }
 
     /// Multiplies what is shown of light.
@@ -112,72 +182,91 @@ impl Scene {
             pixels.as_flattened_mut().iter_mut().for_each(|value| *value *= exposure as f32);
         };
         match &mut self.source {
-            Source::Tile(picture) if picture.meaning == Meaning::Linear => scale(&mut picture.pixels),
+            Source::Tile(tile) | Source::Sources { tile, .. } | Source::Plane { tile, .. } => {
+                if tile.meaning == Meaning::Linear {
+                    scale(&mut tile.pixels);
+                }
+            }
             Source::Clusters { colors, .. } => scale(colors),
             Source::Measurement { appearance, .. } => {
                 appearance.terms.iter_mut().for_each(|(.., weight)| *weight *= exposure);
             }
-            Source::Tile(_) | Source::Index(_) | Source::Normals(_) => {}
+            Source::Index(_) | Source::Normals(_) => {}
         }
     }
 
-    /// Reads a window, and of what is stored nothing but the chunks that it touches.
-    pub fn read(&self, window: Window, context: &Context<'_>) -> Result<Band<'_>> {
-        let values = match &self.source {
+    /// Reads some rows, and of what is stored nothing but the chunks that they touch.
+    pub fn read(&self, rows: Range<usize>, context: &Context<'_>) -> Result<Band<'_>> {
+        let width = self.area.size.width;
+        let area =
+            Area { y: self.area.y + rows.start as i64, size: Size::new(rows.len(), width), ..self.area };
+        if let Source::Plane { plane, variation, tile } = &self.source {
+            let source = context.install(|| plane_rows(plane, variation, area))?;
+            return Ok(Band { width, pixels: Pixels::Texels { source, tile: &tile.pixels } });
+        }
+        let window = area.within_first_quadrant().ok_or_else(|| Error::internal("a window below 0"))?;
+        let pixels = match &self.source {
             Source::Measurement { measurement, appearance, decoder } => {
-                Values::Pixels(mixed(measurement, appearance, decoder, window, context)?)
+                Pixels::Own(mixed(measurement, appearance, decoder, window, context)?)
             }
-            Source::Tile(picture) => Values::Pixels(picture.part(window).pixels),
+            Source::Tile(picture) => Pixels::Own(picture.part(window).pixels),
             Source::Clusters { enlarged, colors } => {
                 let index = enlarged.read(window)?;
                 expect_colors(&index, colors)?;
-                Values::Clusters { index, colors }
+                Pixels::Clusters { index, colors }
+            }
+            Source::Sources { enlarged, tile } => {
+                let source = enlarged.read_source(window)?.unwrap_or_default();
+                if let Some(texel) = source.iter().find(|&&texel| texel as usize >= tile.pixels.len()) {
+                    return Err(Error::input(format!(
+                        "source: got texel {texel}, the tile has {}",
+                        tile.pixels.len()
+                    )));
+                }
+                Pixels::Texels { source, tile: &tile.pixels }
             }
             Source::Index(enlarged) => {
-                Values::Pixels(false_color::index(window.size, &enlarged.read(window)?).pixels)
+                Pixels::Own(false_color::index(window.size, &enlarged.read(window)?).pixels)
             }
             Source::Normals(enlarged) => {
                 let normals = enlarged.read_normals(window)?.unwrap_or_default();
-                Values::Pixels(false_color::normals(window.size, &normals).pixels)
+                Pixels::Own(false_color::normals(window.size, &normals).pixels)
             }
+            Source::Plane { .. } => return Err(Error::internal("a plane is not stored")),
         };
-        Ok(Band { width: window.size.width, values })
+        Ok(Band { width, pixels })
     }
 
-    /// The bands of whole rows of chunks that a window is read in, or of parts of them where `allowed`
+    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed`
     /// bytes do not hold more.
     ///
     /// # Errors
     /// Where not even a row fits.
-    pub fn bands(&self, window: Window, allowed_bytes: u64) -> Result<impl Iterator<Item = Window> + use<>> {
-        let row_bytes = (window.size.width * self.texel_bytes()) as u64;
+    pub fn bands(&self, allowed_bytes: u64) -> Result<impl Iterator<Item = Range<usize>> + use<>> {
+        let Size { height, width } = self.area.size;
+        let row_bytes = (width * self.texel_bytes()) as u64;
         let fitting = |&rows: &usize| rows as u64 * row_bytes <= allowed_bytes;
         let rows = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
         let rows = rows.into_iter().find(fitting).ok_or_else(|| {
             Error::usage(format!(
-                "a row of {} pixels takes {} KiB of memory, {} KiB are left for it",
-                window.size.width,
+                "a row of {width} pixels takes {} KiB of memory, {} KiB are left for it",
                 row_bytes.div_ceil(1024),
                 allowed_bytes / 1024
             ))
             .hint("allow a larger --memory, or picture a narrower part")
         })?;
-        let end = window.y + window.size.height;
-        let next = move |y: usize| (y < end).then(|| (y / rows + 1) * rows);
-        let tops = std::iter::successors(Some(window.y), move |&y| next(y).filter(|&y| y < end));
-        Ok(tops.map(move |y| {
-            let rows = ((y / rows + 1) * rows).min(end) - y;
-            Window { y, x: window.x, size: Size::new(rows, window.size.width) }
-        }))
+        // Rows of chunks begin at row 0 of what is stored.
+        let before = self.area.y.rem_euclid(rows as i64) as usize;
+        let tops = (0..before + height).step_by(rows);
+        Ok(tops.map(move |top| top.saturating_sub(before)..(top + rows - before).min(height)))
     }
 
     /// Rows that are decoded together.
     fn chunk_rows(&self) -> usize {
         match &self.source {
             Source::Measurement { .. } => MEASUREMENT_ROWS,
-            Source::Tile(_) | Source::Clusters { .. } | Source::Index(_) | Source::Normals(_) => {
-                enlarged::CHUNK_SIDE
-            }
+            Source::Plane { .. } => PLANE_SIDE,
+            _ => enlarged::CHUNK_SIDE,
         }
     }
 
@@ -192,11 +281,31 @@ impl Scene {
             Source::Clusters { .. } => size_of::<u8>() + size_of::<u16>(),
             Source::Index(_) => size_of::<u8>() + size_of::<u16>() + PIXEL,
             Source::Normals(_) => 3 * PIXEL,
+            Source::Sources { .. } => 2 * size_of::<u32>(),
+            Source::Plane { .. } => PLANE_TEXEL_BYTES,
         }
     }
 }
 
-fn of_measurement(measurement: Measurement, options: &Options, digest: String) -> Result<Scene> {
+/// Source texels of some rows of a plane; pieces of them are made on all threads.
+fn plane_rows(plane: &Plane, variation: &Variation, area: Area) -> Result<Vec<u32>> {
+    let Size { height, width } = area.size;
+    let columns: Vec<usize> = (0..width).step_by(PLANE_SIDE).collect();
+    let piece = |&left: &usize| {
+        let size = Size::new(height, PLANE_SIDE.min(width - left));
+        Ok((left, size, plane.window(variation, area.y, area.x + left as i64, size)?))
+    };
+    let pieces = columns.par_iter().map(piece).collect::<Result<Vec<_>>>()?;
+    let mut source = vec![0; height * width];
+    for (left, size, piece) in pieces {
+        for (row, to) in piece.chunks_exact(size.width).zip(source.chunks_exact_mut(width)) {
+            to[left..left + size.width].copy_from_slice(row);
+        }
+    }
+    Ok(source)
+}
+
+fn of_measurement(measurement: Measurement, options: &Options) -> Result<(Source, Size)> {
     let Subject::Appearance { view, light } = options.subject else {
         return Err(Error::usage(
             "a measurement has no index and no normal map yet: picture its model instead",
@@ -205,36 +314,87 @@ fn of_measurement(measurement: Measurement, options: &Options, digest: String) -
     let description = measurement.description();
     let (size, decoder) = (description.size, description.decoder()?);
     let appearance = super::measured_appearance(&measurement, view, light);
-    Ok(Scene { source: Source::Measurement { measurement, appearance, decoder }, size, digest })
+    Ok((Source::Measurement { measurement, appearance, decoder }, size))
 }
 
-fn of_tile(model: &Model, options: &Options) -> Result<Scene> {
-    let size = model.tile()?.size;
-    let picture = match options.subject {
-        Subject::Appearance { view, light } => {
-            look_up(size, &model.index()?, &cluster_colors(model, view, light)?)?
+fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {
+    let tile = tile_picture(model, options, context)?;
+    let size = tile.size;
+    Ok((Source::Tile(tile), size))
+}
+
+/// The tile's texels under the light, by clusters or as measured, or in false colours.
+fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Result<Picture> {
+    let tile = model.tile()?;
+    match (options.subject, &options.values) {
+        (Subject::Appearance { view, light }, Values::Model) => {
+            look_up(tile.size, &model.index()?, &cluster_colors(model, view, light)?)
         }
-        Subject::Index => false_color::index(size, &model.index()?),
-        Subject::Normals => false_color::normals(size, &model.normals()?),
-    };
-    Ok(Scene { source: Source::Tile(picture), size, digest: model.stage_digest(Stage::Cluster)? })
+        (Subject::Appearance { view, light }, Values::Measured(path)) => {
+            let path = path.clone().unwrap_or_else(|| measurement_beside(model.path()));
+            let measurement = open_measurement_of(model, &path)
+                .map_err(|error| error.hint("name the measurement with --measurement"))?;
+            of_measured_tile(&measurement, &tile, view, light, context)
+        }
+        (Subject::Index, _) => Ok(false_color::index(tile.size, &model.index()?)),
+        (Subject::Normals, _) => Ok(false_color::normals(tile.size, &model.normals()?)),
+    }
 }
 
-fn of_enlarged(enlarged: Enlarged, options: &Options, digest: String) -> Result<Scene> {
+/// Where `btf model` finds the measurement by default: `wood.zarr` beside `wood.model.zarr`.
+fn measurement_beside(model: &Path) -> PathBuf {
+    let model: PathBuf = model.components().collect();
+    let name = model.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    model.with_file_name(format!("{}.zarr", name.strip_suffix(".model.zarr").unwrap_or(&name)))
+}
+
+fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Context<'_>) -> Result<Scene> {
+    let area = options.window.ok_or_else(|| {
+        Error::usage("an endless plane has no size of its own: say which part with --window x,y,width,height")
+    })?;
+    let tile = tile_picture(model, options, context)?;
+    let appearance = model.appearance()?;
+    let plane = context.install(|| Plane::new(tile.size, &model.index()?, &appearance, Kernel::fastest()))?;
+    let mut variation = plane.variation(which.seed);
+    variation.jitter = which.jitter.unwrap_or(variation.jitter);
+    plane.check(&variation)?;
+    let recipe = json!({
+        "kind": "plane",
+        "digest": model.digest_of(enlarged::Method::Coherent.stages())?,
+        "seed": variation.seed,
+        "jitter": variation.jitter,
+        "window": [area.x, area.y, area.size.width, area.size.height],
+        "values": if options.values == Values::Model { "model" } else { "measured" },
+    });
+    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe })
+}
+
+fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {
     let size = enlarged.size();
     let source = match options.subject {
-        Subject::Appearance { view, light } => {
+        Subject::Appearance { view, light } if options.values == Values::Model => {
             let colors = cluster_colors(&model_of(&enlarged, options)?, view, light)?;
             Source::Clusters { enlarged, colors }
         }
         Subject::Index => Source::Index(enlarged),
         Subject::Normals if enlarged.has_normals() => Source::Normals(enlarged),
+        Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
+            let tile = tile_picture(&model_of(&enlarged, options)?, options, context)?;
+            Source::Sources { enlarged, tile }
+        }
         Subject::Normals => {
             return Err(Error::missing(format!("{} has no normals", options.source.display()))
                 .hint("enlarge with --keep-normals to have them"));
         }
+        Subject::Appearance { .. } => {
+            return Err(Error::missing(format!(
+                "{} does not say which texel of the tile each of its texels is",
+                options.source.display()
+            ))
+            .hint("enlarge by --method coherent, without --no-source"));
+        }
     };
-    Ok(Scene { source, size, digest })
+    Ok((source, size))
 }
 
 /// The model that an enlarged index refers to.

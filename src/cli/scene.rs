@@ -1,0 +1,71 @@
+use std::path::{Path, PathBuf};
+
+use btfkit::coherent::JITTER_ONE;
+use btfkit::shape::Area;
+use btfkit::stage::image::{Options, PlaneOptions, Subject, Values};
+use btfkit_formats::Direction;
+use clap::{Args, ValueEnum};
+
+use super::enlarge::jitter;
+
+/// What a picture shows.
+#[derive(Args)]
+pub(super) struct SceneArgs {
+    /// Light: theta,phi in degrees; phi counter-clockwise from the right
+    #[arg(long, default_value = "15,0")]
+    pub(super) light: Direction,
+    /// View: theta,phi in degrees
+    #[arg(long, default_value = "0,0")]
+    pub(super) view: Direction,
+    /// Part to show: x,y,width,height
+    #[arg(long, allow_hyphen_values = true)]
+    window: Option<Area>,
+    /// Factor on the linear values
+    #[arg(long, default_value_t = 1.0)]
+    pub(super) exposure: f64,
+    /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
+    #[arg(long, value_enum, default_value = "model")]
+    values: ValuesName,
+    /// The measurement, for --values measured [default: beside the model, without .model in its name]
+    #[arg(long)]
+    measurement: Option<PathBuf>,
+    /// The model of an enlarged index [default: beside it, under the name it had]
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Of a model: a part of its endless plane, made at once and not stored; --window says which, negative x and y too
+    #[arg(long)]
+    plane: bool,
+    /// Seed of the plane
+    #[arg(long, requires = "plane", default_value_t = 1)]
+    seed: u32,
+    /// Jitter of the plane, from 0 to 1, as in `btf enlarge`
+    #[arg(long, requires = "plane", value_parser = jitter)]
+    jitter: Option<f64>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ValuesName {
+    /// The representatives of the clusters
+    Model,
+    /// The measurement's, without loss by clusters
+    Measured,
+}
+
+impl SceneArgs {
+    pub(super) fn options(&self, source: &Path, subject: Subject) -> Options {
+        Options {
+            source: source.to_owned(),
+            model: self.model.clone(),
+            subject,
+            values: match self.values {
+                ValuesName::Model => Values::Model,
+                ValuesName::Measured => Values::Measured(self.measurement.clone()),
+            },
+            plane: self.plane.then(|| PlaneOptions {
+                seed: self.seed,
+                jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
+            }),
+            window: self.window,
+        }
+    }
+}

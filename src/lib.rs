@@ -18,6 +18,7 @@ pub mod error;
 pub mod factor;
 pub mod hdf5;
 pub mod kernel;
+pub mod lattice;
 pub mod mrf;
 pub mod picture;
 pub mod random;

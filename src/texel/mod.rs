@@ -2,6 +2,7 @@
 
 pub mod cluster;
 pub mod companion;
+pub mod components;
 pub mod evaluate;
 pub mod nearest;
 pub mod scan;

@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use btfkit::error::{Error, Result};
+use btfkit::lattice::LatticeChoice;
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::stage::cluster::{Amount, Step, Stepped};
@@ -232,7 +233,7 @@ impl Whole {
         tell_normals(&plan.run(context)?, tell);
         let plan = fit_plan(&model, &self.fit)?;
         tell_field(&plan.run(context)?, tell);
-        tell_appearance(&appearance_plan(&model)?.run(context)?, tell);
+        tell_appearance(&appearance_plan(&model, &LatticeChoice::Auto)?.run(context)?, tell);
         Ok(())
     }
 }

@@ -1,12 +1,16 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
+use btfkit::lattice::{LatticeChoice, WaveCounts};
 use btfkit::run::Context;
 use btfkit::stage::appearance;
 use btfkit::store::appearance::AppearanceReport;
 use clap::Args;
 
 use super::Tell;
+
+/// Fewer cells than this repeat visibly.
+const FEW_CELLS: u64 = 16;
 
 /// Describe how a model's exemplar looks, for `btf enlarge`
 #[derive(Args)]
@@ -17,6 +21,9 @@ Example:
 pub(super) struct Appearance {
     /// The model with the clusters
     model: PathBuf,
+    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
+    lattice: LatticeChoice,
     /// Only print what would be done
     #[arg(long)]
     dry_run: bool,
@@ -24,7 +31,7 @@ pub(super) struct Appearance {
 
 impl Appearance {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let plan = appearance_plan(&self.model)?;
+        let plan = appearance_plan(&self.model, &self.lattice)?;
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
@@ -33,8 +40,8 @@ impl Appearance {
     }
 }
 
-pub(super) fn appearance_plan(model: &Path) -> Result<appearance::Plan> {
-    appearance::plan(&appearance::Options { model: model.into() })
+pub(super) fn appearance_plan(model: &Path, lattice: &LatticeChoice) -> Result<appearance::Plan> {
+    appearance::plan(&appearance::Options { model: model.into(), lattice: *lattice })
 }
 
 pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
@@ -44,4 +51,16 @@ pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
         "exemplar  {width}x{height}, described at {} levels from 1 to {coarsest} texels apart",
         report.levels.len()
     ));
+    let cells = WaveCounts(report.lattice.clone()).cells();
+    tell.line(match (report.found.as_str(), report.lattice.len()) {
+        ("none", _) => "          no lattice: the material is irregular".to_owned(),
+        (found, 0) => {
+            format!("          lattice {found}, not used: the exemplar is no whole number of its cells")
+        }
+        (found, 1) => format!("          ribs, a period of {found} texels (rows, columns), {cells} of them"),
+        (found, _) => format!("          lattice of {found} texels (rows, columns), {cells} cells"),
+    });
+    if !report.lattice.is_empty() && cells < FEW_CELLS {
+        tell.line("          few cells: large pieces of an enlargement will be copies; measure a larger part if you can");
+    }
 }

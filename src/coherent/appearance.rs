@@ -1,7 +1,7 @@
 //! What a model stores for the coherent rule: how texels of the exemplar look, as small whole numbers.
 
-use crate::coherent::lattice::WaveCounts;
 use crate::error::{Error, Result};
+use crate::lattice::WaveCounts;
 use crate::shape::{Size, Window};
 
 /// Features of a cluster.
@@ -61,6 +61,27 @@ pub struct Basis {
     pub offset: Vec<i32>,
     /// From 1 to 20.
     pub shift: u32,
+    /// Passes of correction, from 1 to 8.
+    pub passes: usize,
+    /// What a site one side of the exemplar away costs that comes from the same row or column; at most 2^22. It is 0
+    /// but at coarse levels, since what it reads lies far away.
+    pub repetition: i32,
+}
+
+/// Levels, counted from the coarsest, at which repetition costs.
+const REPETITION_LEVELS: usize = 2;
+
+/// The square of a deviation of the first dimension (127 / 4, three times over as sums are) in each of four neighbours.
+const REPETITION: i32 = 9 * 4 * 32 * 32;
+
+/// Passes of correction that a level is given.
+pub fn passes_of(level: usize) -> usize {
+    if level == 0 { 1 } else { 2 }
+}
+
+/// What repetition is made to cost at a level.
+pub fn repetition_of(level: usize, levels: usize) -> i32 {
+    if level + REPETITION_LEVELS >= levels { REPETITION } else { 0 }
 }
 
 impl Appearance {
@@ -89,6 +110,14 @@ impl Appearance {
                 return refused(format!(
                     "level {number}: got {} dimensions and a shift of {}, expected {dims} and 1 to 20",
                     basis.dims, basis.shift
+                ));
+            }
+            if !(1..=8).contains(&basis.passes) || !(0..=1 << 22).contains(&basis.repetition) {
+                return refused(format!(
+                    "level {number}: got {} passes and a repetition cost of {}, expected 1 to 8 and 0 to {}",
+                    basis.passes,
+                    basis.repetition,
+                    1 << 22
                 ));
             }
         }

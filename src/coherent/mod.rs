@@ -11,13 +11,13 @@
 mod appearance;
 pub mod fit;
 pub mod hash;
-mod lattice;
 mod level;
 mod plane;
+mod shift;
 mod start;
 
 pub use appearance::{
     Appearance, Basis, FEATURES, FINE_DIMS, INPUTS, JITTER_ONE, LEVELS_MOST, MOST_SIDE, dims_of, levels_of,
+    passes_of, repetition_of,
 };
-pub use lattice::WaveCounts;
 pub use plane::{Plane, Variation};

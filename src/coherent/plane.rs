@@ -6,20 +6,16 @@ use crate::coherent::start::Start;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::kernel::coherent::{Repetition, Subpass, correct_coarse, correct_fine, unpack};
+use crate::lattice::WaveCounts;
 use crate::shape::{Size, Window};
 
 /// Order of the parities, (row, column), in which the sub-passes of a pass correct.
 const PARITIES: [[i64; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
 
-/// Levels, counted from the coarsest, at which repetition costs.
-const REPETITION_LEVELS: usize = 2;
-
-/// Cost of a site that comes from the same row or column: once the square of a deviation of the first dimension
-/// (127 / 4, three times over as sums are) in each of four neighbours.
-const REPETITION_COST: i32 = 9 * 4 * 32 * 32;
-
-/// Rows and columns around a region that one pass reaches, and two.
-const REACH: [[usize; 2]; 2] = [[6, 6], [10, 12]];
+/// Rows and columns that each pass reaches.
+const REACH: [usize; 2] = [4, 6];
+/// And those that the first reaches besides.
+const REACH_BEYOND: [usize; 2] = [2, 0];
 
 /// Jitter where there is no lattice: half a spacing.
 const JITTER: u32 = JITTER_ONE / 2;
@@ -44,10 +40,18 @@ pub struct Plane {
     tile_width: usize,
     exemplar: Window,
     wraps: bool,
-    lattice: crate::coherent::WaveCounts,
+    lattice: WaveCounts,
     /// The finest first.
-    levels: Vec<Levelled>,
+    levels: Vec<Correction>,
     kernel: Kernel,
+}
+
+/// How a level is corrected.
+struct Correction {
+    level: Levelled,
+    passes: usize,
+    /// Cost of a site that comes from the same row or column.
+    repetition: i32,
 }
 
 enum Levelled {
@@ -122,10 +126,11 @@ impl Plane {
         let mut levels = Vec::with_capacity(count);
         for (number, basis) in appearance.levels.iter().enumerate() {
             let spacing = 1 << number;
-            levels.push(match dims_of(number, count) {
+            let level = match dims_of(number, count) {
                 4 => Levelled::Fine(Level::new(&features, basis, spacing)),
                 _ => Levelled::Coarse(Level::new(&features, basis, spacing)),
-            });
+            };
+            levels.push(Correction { level, passes: basis.passes, repetition: basis.repetition });
             if number + 1 < count {
                 features.blur(spacing);
             }
@@ -143,7 +148,7 @@ impl Plane {
 
     /// The variation of a seed as it is by default.
     pub fn variation(&self, seed: u32) -> Variation {
-        let jitter = if self.lattice.is_empty() { JITTER } else { 0 };
+        let jitter = if self.lattice.0.is_empty() { JITTER } else { 0 };
         Variation { seed, jitter, wrap: None }
     }
 
@@ -191,7 +196,7 @@ impl Plane {
 
     /// Bytes that the levels take in memory.
     pub fn bytes(&self) -> u64 {
-        let level = |level: &Levelled| match level {
+        let level = |correction: &Correction| match &correction.level {
             Levelled::Fine(level) => size_of_val(&level.values[..]),
             Levelled::Coarse(level) => size_of_val(&level.values[..]),
         };
@@ -228,14 +233,6 @@ impl Plane {
         ((self.exemplar.y + y) * self.tile_width + self.exemplar.x + x) as u32
     }
 
-    fn passes(level: usize) -> usize {
-        if level == 0 { 1 } else { 2 }
-    }
-
-    fn resists_repetition(&self, level: usize) -> bool {
-        level + REPETITION_LEVELS >= self.levels.len()
-    }
-
     /// Sides of the exemplar in texels of a level.
     fn sides_at(&self, level: usize) -> [usize; 2] {
         let Size { height, width } = self.exemplar.size;
@@ -244,24 +241,27 @@ impl Plane {
 
     /// Rows and columns around a region that its correction depends on.
     fn halo(&self, level: usize) -> [usize; 2] {
-        let passes = Self::passes(level);
-        if self.resists_repetition(level) {
-            self.sides_at(level).map(|side| passes * (side + 6))
-        } else {
-            REACH[passes - 1]
-        }
+        let Correction { passes, repetition, .. } = self.levels[level];
+        let sides = self.sides_at(level);
+        std::array::from_fn(|axis| {
+            if repetition > 0 {
+                passes * (sides[axis] + 6)
+            } else {
+                passes * REACH[axis] + REACH_BEYOND[axis]
+            }
+        })
     }
 
     /// Corrects the positions of a level; those in the halo come out as whatever they do.
     fn correct(&self, level: usize, region: &Region, positions: &mut [u32]) {
         let Size { height, width } = region.size;
-        let repeats = self.resists_repetition(level);
+        let Correction { level: appearance, passes, repetition: cost } = &self.levels[level];
+        let repeats = *cost > 0;
         let distance = self.sides_at(level);
         let margin = if repeats { distance.map(|side| (side + 1).max(2)) } else { [2, 2] };
-        for _ in 0..Self::passes(level) {
+        for _ in 0..*passes {
             let before = if repeats { positions.to_vec() } else { Vec::new() };
-            let repetition =
-                repeats.then_some(Repetition { before: &before, distance, cost: REPETITION_COST });
+            let repetition = repeats.then_some(Repetition { before: &before, distance, cost: *cost });
             for parity in PARITIES {
                 let first = |place: i64, parity: i64, margin: usize| {
                     margin + ((parity - place - margin as i64) & 1) as usize
@@ -270,7 +270,7 @@ impl Plane {
                 let columns = [first(region.x, parity[1], margin[1]), width.saturating_sub(margin[1])];
                 let sides = [self.exemplar.size.height, self.exemplar.size.width];
                 let crosses_border = level > 0 || self.wraps;
-                match &self.levels[level] {
+                match appearance {
                     Levelled::Fine(level) => {
                         let appearance = &level.values;
                         let (stride, spacing) = (level.stride, level.spacing);

@@ -2,9 +2,9 @@
 //! and shaken at the others.
 
 use crate::coherent::hash;
-use crate::coherent::lattice::WaveCounts;
 use crate::coherent::plane::Region;
 use crate::kernel::coherent::{pack, unpack};
+use crate::lattice::WaveCounts;
 use crate::shape::Size;
 
 /// What all levels of a window share.

@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::coherent::fit::{Clusters, features, fit};
-use crate::coherent::{MOST_SIDE, WaveCounts};
+use crate::coherent::{FEATURES, MOST_SIDE};
 use crate::color::lab;
 use crate::error::{Error, Result};
+use crate::lattice::{Lattice, LatticeChoice, WaveCounts, detect, largest_whole_cells, wave_counts};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
-use crate::shape::Window;
+use crate::shape::{Size, Window};
 use crate::store::appearance::AppearanceReport;
 use crate::store::model::{Model, Stage};
 use crate::texel::tile::Tile;
@@ -21,12 +22,15 @@ use crate::texel::tile::Tile;
 pub struct Options {
     /// The model.
     pub model: PathBuf,
+    /// The lattice of a regular material.
+    pub lattice: LatticeChoice,
 }
 
 /// A description, ready to be made.
 pub struct Plan {
     model: Model,
     tile: Tile,
+    lattice: LatticeChoice,
     recipe: Value,
 }
 
@@ -41,8 +45,11 @@ pub fn plan(options: &Options) -> Result<Plan> {
             tile.size
         )));
     }
-    let recipe = json!({"stage": "appearance", "method": METHOD, "cluster": cluster});
-    Ok(Plan { model, tile, recipe })
+    let lattice = options.lattice;
+    let recipe = json!({
+        "stage": "appearance", "method": METHOD, "cluster": cluster, "lattice": lattice.to_string(),
+    });
+    Ok(Plan { model, tile, lattice, recipe })
 }
 
 impl Plan {
@@ -57,25 +64,36 @@ impl Plan {
             return self.model.report(Stage::Appearance);
         };
         context.progress.begin("appearance", 1, Counted::Items("exemplar"));
-        let exemplar = self.tile.size.window();
-        let texels = part(&self.model.index()?, self.tile.size.width, exemplar);
-        let features = self.features(&texels, context)?;
-        let appearance =
-            context.install(|| fit(exemplar, self.tile.wraps, &texels, features, WaveCounts::default()));
+        let index = self.model.index()?;
+        let size = self.tile.size;
+        let all = self.features(&index, context)?;
+        let (found, strongest_peak) = context.install(|| self.lattice(&index, &all));
+        let (exemplar, counts) = exemplar(&found, size, self.tile.wraps);
+        let texels = part(&index, size.width, exemplar);
+        let features = if exemplar.size == size { all } else { self.features(&texels, context)? };
+        let appearance = context.install(|| fit(exemplar, self.tile.wraps, &texels, features, counts));
         self.model.write_appearance(&appearance)?;
-        let report = AppearanceReport::new(&appearance);
+        let report = AppearanceReport::new(&appearance, &found, strongest_peak);
         self.model.finish(Stage::Appearance, &self.recipe, &report)?;
         context.progress.advance(1);
         context.progress.end();
         Ok(report)
     }
 
-    /// Features of every cluster.
-    fn features(
-        &self,
-        texels: &[u16],
-        context: &Context<'_>,
-    ) -> Result<Vec<[i8; crate::coherent::FEATURES]>> {
+    /// The lattice that was given, or that the features of the tile's texels have; and their strongest peak.
+    fn lattice(&self, index: &[u16], features: &[[i8; FEATURES]]) -> (Lattice, f64) {
+        let texels = index.iter().flat_map(|&cluster| features[usize::from(cluster)]);
+        let values: Vec<f32> = texels.map(f32::from).collect();
+        let detection = detect(self.tile.size, FEATURES, &values, self.tile.wraps);
+        let lattice = match &self.lattice {
+            LatticeChoice::Auto => detection.lattice,
+            LatticeChoice::Given(lattice) => *lattice,
+        };
+        (lattice, detection.strongest_peak)
+    }
+
+    /// Features of every cluster, by how often it occurs in some texels.
+    fn features(&self, texels: &[u16], context: &Context<'_>) -> Result<Vec<[i8; FEATURES]>> {
         let [views, lights] = self.model.directions()?;
         let view_weights: Vec<f64> = views.iter().map(|view| libm::cos(view.theta_rad)).collect();
         let centres = self.model.centres()?;
@@ -107,6 +125,15 @@ impl Plan {
         };
         Ok(context.install(|| features(&clusters)))
     }
+}
+
+/// The part of a tile that is taken as the exemplar, and its lattice: a tile that wraps as it is, one that does not
+/// cut to whole cells. Where that cannot be, the lattice is not used.
+fn exemplar(lattice: &Lattice, tile: Size, wraps: bool) -> (Window, WaveCounts) {
+    let whole = tile.window();
+    let exemplar = if wraps { Some(whole) } else { largest_whole_cells(lattice, tile) };
+    let counted = exemplar.and_then(|part| Some((part, wave_counts(lattice, part.size)?)));
+    counted.unwrap_or((whole, WaveCounts::default()))
 }
 
 /// The clusters of a part of a tile.

@@ -9,8 +9,9 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
 
-use crate::coherent::{Appearance, Basis, FEATURES, INPUTS, WaveCounts, dims_of};
+use crate::coherent::{Appearance, Basis, FEATURES, INPUTS, dims_of};
 use crate::error::{Error, Result};
+use crate::lattice::{Lattice, WaveCounts};
 use crate::shape::{Size, Window};
 use crate::store::{Layout, Store};
 
@@ -23,6 +24,10 @@ pub struct AppearanceReport {
     pub wraps: bool,
     /// Cycles of a regular material down the exemplar's height and across its width; a row for each direction.
     pub lattice: Vec<[i32; 2]>,
+    /// The lattice that was found or given, in texels as `dy,dx;dy,dx`, whether or not the exemplar holds whole cells.
+    pub found: String,
+    /// Highest peak of the autocorrelation of the features, at least 3 texels from 0; of 1.
+    pub strongest_peak: f64,
     /// The levels, the finest first.
     pub levels: Vec<LevelReport>,
 }
@@ -36,22 +41,30 @@ pub struct LevelReport {
     pub dims: usize,
     /// Binary places of the basis and the offset.
     pub shift: u32,
+    /// Passes of correction.
+    pub passes: usize,
+    /// What a site one side of the exemplar away costs that comes from the same row or column.
+    pub repetition: i32,
 }
 
 impl AppearanceReport {
     /// The report of an appearance.
-    pub fn new(appearance: &Appearance) -> Self {
+    pub fn new(appearance: &Appearance, found: &Lattice, strongest_peak: f64) -> Self {
         let Window { y, x, size } = appearance.exemplar;
         let levels = appearance.levels.iter().enumerate();
         let level = |(number, basis): (usize, &Basis)| LevelReport {
             spacing: 1 << number,
             dims: basis.dims,
             shift: basis.shift,
+            passes: basis.passes,
+            repetition: basis.repetition,
         };
         Self {
             exemplar: [y, x, size.height, size.width],
             wraps: appearance.wraps,
             lattice: appearance.lattice.0.clone(),
+            found: found.to_string(),
+            strongest_peak,
             levels: levels.map(level).collect(),
         }
     }
@@ -93,7 +106,8 @@ pub(super) fn read(
         let group = format!("appearance/level_{number}");
         let (_, weights) = store.read::<i16>(&format!("{group}/basis"), &[INPUTS, dims])?;
         let (_, offset) = store.read::<i32>(&format!("{group}/offset"), &[dims])?;
-        Ok(Basis { dims, weights, offset, shift: level.shift })
+        let LevelReport { shift, passes, repetition, .. } = *level;
+        Ok(Basis { dims, weights, offset, shift, passes, repetition })
     };
     let appearance = Appearance {
         exemplar: Window { y, x, size: Size::new(height, width) },

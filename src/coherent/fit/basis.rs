@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use crate::coherent::appearance::{Basis, FEATURES, INPUTS};
+use crate::coherent::appearance::{Basis, FEATURES, INPUTS, dims_of, passes_of, repetition_of};
 use crate::coherent::level::Features;
 
 /// Texels that a basis is fitted to; of larger exemplars every n-th row and column.
@@ -18,8 +18,9 @@ const DEVIATIONS: f64 = 4.0;
 /// Largest absolute value of a blurred feature: 16 times 127.
 const INPUT_MOST: f64 = 2032.0;
 
-/// Fits `dims` principal components to the surroundings of texels `spacing` apart.
-pub(super) fn fit(features: &Features, spacing: usize, dims: usize) -> Basis {
+/// Fits principal components to the surroundings of texels at a level.
+pub(super) fn fit(features: &Features, level: usize, levels: usize) -> Basis {
+    let (spacing, dims) = (1 << level, dims_of(level, levels));
     let (mean, covariance) = moments(features, spacing);
     let window: Vec<f64> = (0..INPUTS)
         .map(|input| {
@@ -45,11 +46,13 @@ pub(super) fn fit(features: &Features, spacing: usize, dims: usize) -> Basis {
             window.iter().zip(column.iter()).map(|(w, v)| w * v * gain * largest.signum()).collect()
         })
         .collect();
-    in_fixed_point(&exact, &mean)
+    let (weights, offset, shift) = in_fixed_point(&exact, &mean);
+    let (passes, repetition) = (passes_of(level), repetition_of(level, levels));
+    Basis { dims, weights, offset, shift, passes, repetition }
 }
 
-/// Weights in i16 with as many binary places as keep every sum within 32 bits.
-fn in_fixed_point(exact: &[Vec<f64>], mean: &[f64]) -> Basis {
+/// Weights in i16 with as many binary places as keep every sum within 32 bits; offsets, and those places.
+fn in_fixed_point(exact: &[Vec<f64>], mean: &[f64]) -> (Vec<i16>, Vec<i32>, u32) {
     let most = exact.iter().flatten().fold(0.0, |most: f64, w| most.max(w.abs()));
     let sum = exact.iter().map(|weights| weights.iter().map(|w| w.abs()).sum::<f64>()).fold(0.0, f64::max);
     let fits = |shift: u32| {
@@ -70,7 +73,7 @@ fn in_fixed_point(exact: &[Vec<f64>], mean: &[f64]) -> Basis {
         }
         offset[dim] = (exact.iter().zip(mean).map(|(w, m)| w * m).sum::<f64>() * scale).round() as i32;
     }
-    Basis { dims, weights, offset, shift }
+    (weights, offset, shift)
 }
 
 /// Mean and covariance of the surroundings, from sums of whole numbers: the same for every number of threads.

@@ -6,9 +6,9 @@ mod features;
 
 pub use features::{Clusters, features};
 
-use crate::coherent::appearance::{Appearance, FEATURES, dims_of, levels_of};
-use crate::coherent::lattice::WaveCounts;
+use crate::coherent::appearance::{Appearance, FEATURES, levels_of};
 use crate::coherent::level::Features;
+use crate::lattice::WaveCounts;
 use crate::shape::Window;
 
 /// Fits an appearance.
@@ -26,7 +26,7 @@ pub fn fit(
     let count = levels_of(exemplar.size);
     let levels = (0..count)
         .map(|level| {
-            let basis = basis::fit(&blurred, 1 << level, dims_of(level, count));
+            let basis = basis::fit(&blurred, level, count);
             blurred.blur(1 << level);
             basis
         })

@@ -1,21 +1,10 @@
-//! The lattice of a regular material, in whole numbers.
+//! Shifts of an exemplar that map a regular material to itself, in whole numbers.
 
 use crate::error::{Error, Result};
+use crate::lattice::WaveCounts;
 use crate::shape::Size;
 
-/// How often a regular material repeats along the exemplar: no rows (irregular), one (ribs: regular in one direction
-/// only) or two, each `[cycles down its height, cycles across its width]`.
-///
-/// A shift (sy, sx) maps the material to itself where `c[0] sy / height + c[1] sx / width` is whole for each row c.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct WaveCounts(pub Vec<[i32; 2]>);
-
 impl WaveCounts {
-    /// Whether the material has no lattice.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Checks that shifts of an exemplar of this size can be drawn in 32-bit whole numbers.
     ///
     /// # Errors

@@ -197,7 +197,7 @@ pub(super) fn commands(settings: &Settings) -> Section {
     let seed = format!("--seed {seed}");
     let directions = format!("--views {directions} --lights {directions}");
     let limits = format!("--passes {passes} --tolerance {tolerance}");
-    let synthesis = format!("--candidates {candidates} --keep-normals");
+    let synthesis = format!("--method paper --candidates {candidates} --keep-normals");
     let lines = vec![
         format!("btf sample {archive} --material {material} --size {sample} {directions} {seed}"),
         format!("btf import {archive} {measurement}"),

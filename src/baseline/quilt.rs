@@ -4,7 +4,8 @@
 //! places that a block may come from, one is drawn among those whose overlap differs by at most a tenth more than the
 //! least, and it is cut in along minimum-error paths. As in the original, but:
 //!
-//! - places are drawn by hash, 256 for each block, where the tile has more;
+//! - places are drawn by hash, 4096 for each block where the tile has more, and the 256 whose overlap fits best at some
+//!   of its texels are compared at all;
 //! - the place that merely goes on where the block at the left or above came from is left out with what is near it: it
 //!   fits without an error, and a tile whose borders join would be copied on and on;
 //! - the distance is D of (26) between clusters, not that of colours.
@@ -17,8 +18,14 @@ use crate::error::Result;
 use crate::random::Hash;
 use crate::shape::Size;
 
-/// Most places that a block is chosen from.
+/// Most places that are drawn for a block.
+const DRAWN: usize = 4096;
+
+/// Most of them that are compared at all texels of the overlap.
 const CANDIDATES: usize = 256;
+
+/// All are compared at one of so many texels of the overlap; prime, so that no row or column of it is left out.
+const SKETCHED: usize = 13;
 
 /// A block is this part of the tile's shorter side, within the limits.
 const BLOCK_PART: usize = 4;
@@ -182,7 +189,7 @@ impl<'a> Quilt<'a> {
         let origins = self.exemplar.origins(size);
         let (row, column) = (self.row as u32, column as u32);
         let place = |number: usize| [number / origins.width, number % origins.width];
-        let all = origins.texels() <= CANDIDATES;
+        let all = origins.texels() <= DRAWN;
         let candidate = |number: usize| {
             if all {
                 return place(number);
@@ -202,19 +209,21 @@ impl<'a> Quilt<'a> {
             .filter(|&[y, x]| shared.has(size, y, x))
             .map(|[y, x]| ([y, x], self.exemplar.costs_beside(canvas(y, x))))
             .collect();
-        let cost = |[top, left]: [usize; 2]| -> u64 {
-            let beside = there.iter().map(|&([y, x], costs)| {
+        let cost = |[top, left]: [usize; 2], every: usize| -> u64 {
+            let beside = there.iter().step_by(every).map(|&([y, x], costs)| {
                 let texel = self.exemplar.texel([top + y, left + x]);
                 u64::from(costs[usize::from(self.exemplar.index[texel as usize])])
             });
             beside.sum()
         };
-        let candidates = (0..origins.texels().min(CANDIDATES)).map(candidate);
-        let (copying, mut costs): (Vec<_>, Vec<_>) =
-            candidates.map(|origin| (origin, cost(origin))).partition(|&(origin, _)| copies_on(origin));
-        if costs.is_empty() {
-            costs = copying;
+        let drawn = (0..origins.texels().min(DRAWN)).map(candidate);
+        let (copying, mut drawn): (Vec<_>, Vec<_>) = drawn.partition(|&origin| copies_on(origin));
+        if drawn.is_empty() {
+            drawn = copying;
         }
+        drawn.sort_by_cached_key(|&origin| cost(origin, SKETCHED));
+        drawn.truncate(CANDIDATES);
+        let mut costs: Vec<_> = drawn.into_iter().map(|origin| (origin, cost(origin, 1))).collect();
         let least = costs.iter().map(|&(_, cost)| cost).min().unwrap_or(0);
         costs.retain(|&(_, cost)| cost <= least + least / TOLERANCE_PART);
         costs[self.hash.below(costs.len() as u64, row, column, 0) as usize].0

@@ -5,6 +5,8 @@
 mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
+#[path = "behaviour/baselines.rs"]
+mod baselines;
 #[path = "behaviour/check.rs"]
 mod check;
 #[path = "behaviour/clusters.rs"]

@@ -102,6 +102,8 @@ fn usage_errors_exit_with_2() {
         btf().arg("enlarge").args([&fixture.model(), &big.path().join("b")]).args([
             "--size",
             "9x9",
+            "--method",
+            "paper",
             "--candidates",
             "0",
         ]),

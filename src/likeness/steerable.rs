@@ -39,16 +39,21 @@ pub(super) fn bands(picture: &Lightness) -> Vec<Vec<Band>> {
     let mut scales = Vec::with_capacity(SCALES);
     for scale in 1..=SCALES {
         let fourier = Fourier::new(low.size);
+        // What all orientations share: the value in its octave, and its direction.
+        let octave = |n: usize| {
+            let (radius, angle) = polar.at(low.frequency(n));
+            (low.values[n] * above(radius + scale as f64), angle)
+        };
+        let octave: Vec<(Complex<f64>, f64)> = (0..low.values.len()).map(octave).collect();
         let band = |orientation: usize| {
             let turn = std::f64::consts::PI * orientation as f64 / ORIENTATIONS as f64;
-            let value = |n: usize| {
-                let (radius, angle) = polar.at(low.frequency(n));
+            let value = |&(value, angle): &(Complex<f64>, f64)| {
                 let along = libm::cos(angle - turn);
                 let window = if along > 0.0 { ANGULAR_GAIN * along * along * along } else { 0.0 };
                 // (-i)^3 = i makes the filters' impulse responses real and odd before they are made complex.
-                Complex::new(0.0, window * above(radius + scale as f64)) * low.values[n]
+                Complex::new(0.0, window) * value
             };
-            Band { size: low.size, values: fourier.inverse((0..low.values.len()).map(value).collect()) }
+            Band { size: low.size, values: fourier.inverse(octave.iter().map(value).collect()) }
         };
         scales.push((0..ORIENTATIONS).map(band).collect());
         low = low.halved();

@@ -20,6 +20,7 @@ pub mod factor;
 pub mod hdf5;
 pub mod kernel;
 pub mod lattice;
+pub mod likeness;
 pub mod mrf;
 pub mod picture;
 pub mod random;

@@ -26,6 +26,8 @@ mod fixture;
 mod hdf5;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
+#[path = "behaviour/judging.rs"]
+mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
 #[path = "behaviour/pictures.rs"]

@@ -17,6 +17,7 @@ mod sample;
 mod scene;
 mod source;
 mod table;
+mod tile;
 mod verify;
 
 use std::io::Write;
@@ -87,7 +88,7 @@ enum Command {
     Verify(verify::Verify),
     Export(export::Export),
     Model(analyse::Whole),
-    Tile(analyse::Tile),
+    Tile(tile::Tile),
     Cluster(analyse::Cluster),
     Curve(curve::Curve),
     Normals(analyse::Normals),

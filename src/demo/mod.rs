@@ -21,6 +21,7 @@ use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
 use crate::demo::story::Section;
 use crate::demo::times::Times;
 use crate::error::Result;
+use crate::lattice::LatticeChoice;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::sample::Kind;
@@ -194,7 +195,8 @@ fn analyse(
     let (measurement, model) = (measurement.to_owned(), model.to_owned());
     times.time("tile", found(Stage::Tile), || {
         let (measurement, model) = (measurement.clone(), model.clone());
-        let options = tile::Options { measurement, model, choice: Choice::Auto, seed: settings.seed };
+        let (choice, lattice) = (Choice::Cut, LatticeChoice::Auto);
+        let options = tile::Options { measurement, model, choice, lattice, seed: settings.seed };
         tile::plan(&options)?.run(context).map(|_| ())
     })?;
     times.time("cluster", found(Stage::Cluster), || {

@@ -36,5 +36,7 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/tiles.rs"]
+mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;

@@ -208,7 +208,8 @@ fn analyse(
     let (measurement, model) = (measurement.to_owned(), model.to_owned());
     times.time("tile", found(Stage::Tile), || {
         let (measurement, model) = (measurement.clone(), model.clone());
-        let options = tile::Options { measurement, model, choice: Choice::Auto, seed: settings.seed };
+        let (choice, lattice) = (Choice::Cut, LatticeChoice::Auto);
+        let options = tile::Options { measurement, model, choice, lattice, seed: settings.seed };
         tile::plan(&options)?.run(context).map(|_| ())
     })?;
     times.time("cluster", found(Stage::Cluster), || {

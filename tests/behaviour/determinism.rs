@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::fixture::{assert_same, btf, enlarge, fixture, succeed, unpack};
+use crate::fixture::{assert_same, btf, enlarge, fixture, model_of, succeed, unpack};
 
 #[test]
 fn threads_and_kernels_change_no_byte() {
@@ -14,7 +14,7 @@ fn threads_and_kernels_change_no_byte() {
             succeed(command.env("BTFKIT_KERNEL", kernel).args(["--threads", threads]))
         };
         run(btf().arg("import").args([&fixture().archive(), &measurement]));
-        run(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        run(&mut model_of(&measurement, &model));
         run(&mut enlarge(&model, &enlarged));
     }
     let [one, three] = ["one", "three"].map(|name| folder.path().join(name));

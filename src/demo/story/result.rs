@@ -209,7 +209,7 @@ pub(super) fn commands(settings: &Settings) -> Section {
     let lines = vec![
         format!("btf sample {archive} --material {material} --size {sample} {directions} {seed}"),
         format!("btf import {archive} {measurement}"),
-        format!("btf tile {measurement} {model} --tile auto {seed}"),
+        format!("btf tile {measurement} {model} --tile cut {seed}"),
         format!("btf cluster {measurement} {model} --clusters {clusters} --centre median {limits} {seed}"),
         format!("btf normals {measurement} {model}"),
         format!("btf fit {model} --mrf 3d"),

@@ -30,6 +30,8 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
             "--size",
             "64x64",
             "--keep-normals",
+            "--method",
+            "paper",
         ]),
         65,
     );
@@ -104,6 +106,8 @@ fn usage_errors_exit_with_2() {
             "9x9",
             "--candidates",
             "0",
+            "--method",
+            "paper",
         ]),
         2,
     );

@@ -9,6 +9,12 @@ mod bad_input;
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/coherent.rs"]
+mod coherent;
+#[path = "behaviour/coherent_damage.rs"]
+mod coherent_damage;
+#[path = "behaviour/coherent_example.rs"]
+mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
@@ -26,6 +32,8 @@ mod hdf5;
 mod interruption;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/paper_bytes.rs"]
+mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]

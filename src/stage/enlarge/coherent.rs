@@ -114,7 +114,7 @@ impl Rule for Coherent {
     }
 
     fn units(&self, subject: &Subject) -> (&'static str, usize) {
-        ("block of shards", blocks(subject.options.size, BLOCK_SHARDS).count())
+        ("blocks of shards", blocks(subject.options.size, BLOCK_SHARDS).count())
     }
 
     fn recipe(&self) -> Map<String, Value> {

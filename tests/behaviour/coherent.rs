@@ -192,8 +192,10 @@ fn killed_and_stopped_it_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let [disturbed, whole] = ["disturbed", "whole"].map(|name| folder.path().join(name));
     let run = |path: &Path| enlarge(&model("whole"), path, BLOCKS);
-    for (signal, shards) in [("-KILL", 1), ("-TERM", 4), ("-KILL", 7)] {
-        let code = interrupt(&mut run(&disturbed), signal, || count(&disturbed, "index/c/") >= shards);
+    let shards = || count(&disturbed, "index/c/");
+    for signal in ["-KILL", "-TERM", "-KILL"] {
+        let before = shards();
+        let code = interrupt(&mut run(&disturbed), signal, || shards() > before);
         assert_eq!(code, if signal == "-TERM" { Some(75) } else { None }, "it ended before {signal}");
     }
     let host = btfkit::store::mapped::host();
@@ -245,7 +247,7 @@ fn what_cannot_be_made_is_refused_and_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.zarr");
     let told = fail(enlarge(&model("whole"), &output, "96x65").arg("--tileable"), 2);
-    assert!(told.contains("96x65") && told.contains("multiples of") && told.contains("96x96"), "{told}");
+    assert!(told.contains("96x65") && told.contains("multiples of") && told.contains("96x80"), "{told}");
     for (size, more) in [
         ("0x64", &[][..]),
         ("64x-1", &[]),

@@ -47,7 +47,6 @@ fn refused(store: &Path, damage: impl Fn(&Path), command: impl Fn(&Path) -> Comm
     let folder = tempfile::tempdir().unwrap();
     let damaged = folder.path().join(store.file_name().unwrap());
     copy(store, &damaged);
-    succeed(&mut limited(&command(&damaged)));
     damage(&damaged);
     let output = limited(&command(&damaged)).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
@@ -63,10 +62,19 @@ fn picture(model: &Path) -> Command {
     command
 }
 
+/// What is refused below is refused for the damage, not for the limits.
+fn whole_ones_are_accepted() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole.model.zarr");
+    copy(&model("cut"), &whole);
+    succeed(&mut limited(&picture(&whole)));
+}
+
 const REPORT: &str = "/attributes/btfkit/stages/appearance/report";
 
 #[test]
 fn a_damaged_report_of_an_appearance_is_refused() {
+    whole_ones_are_accepted();
     let huge = json!(u64::MAX);
     let levels = json!([{"spacing": 1, "dims": 8, "shift": 9, "passes": 2, "repetition": 0}]);
     for (member, value, named) in [
@@ -107,7 +115,7 @@ fn a_damaged_report_of_an_appearance_is_refused() {
         ("levels/3/repetition", Some(json!((1 << 22) + 1)), "repetition"),
         ("levels/0/repetition", Some(json!(1)), "repetition"),
         ("levels/3/repetition", Some(json!(1i64 << 40)), "appearance"),
-        ("levels/1", None, "levels"),
+        ("levels/1", None, "level"),
     ] {
         let damage =
             |store: &Path| change(&store.join("zarr.json"), &format!("{REPORT}/{member}"), value.clone());
@@ -159,7 +167,7 @@ fn damaged_arrays_of_an_appearance_are_refused() {
     let clusters = ["--clusters", "60"];
     succeed(btf().arg("cluster").args([&crate::fixture::fixture().measurement(), &more]).args(clusters));
     let index = "index/c/0/0";
-    let damage = |store: &Path| drop(std::fs::copy(more.join(index), store.join(index)).unwrap());
+    let damage = |store: &Path| assert!(std::fs::copy(more.join(index), store.join(index)).is_ok());
     refused(&model("cut"), damage, picture, "index: cluster");
 }
 
@@ -200,14 +208,17 @@ fn a_damaged_enlarged_index_is_refused() {
             command
         }
     };
+    for values in ["model", "measured"] {
+        succeed(&mut limited(&show(values)(&big)));
+    }
     for (member, value, named) in [
         ("recipe/rule", Some(json!("unheard-of")), "recipe"),
         ("recipe/rule", Some(json!(5)), "recipe"),
-        ("recipe/rule", None, "another model"),
+        ("recipe/rule", None, "fit"),
         ("recipe/source", Some(json!("yes")), "source"),
         ("recipe/source", None, "texel"),
         ("recipe/model", Some(json!("0123")), "another model"),
-        ("recipe", Some(json!([])), "another model"),
+        ("recipe", Some(json!([])), "fit"),
         ("kind", Some(json!("model")), ""),
         ("kind", Some(json!(1)), "kind"),
         ("format", Some(json!(1000)), "format"),
@@ -248,7 +259,7 @@ fn a_damaged_enlarged_index_is_refused() {
         refused(&big, cut, show(if array == "index" { "model" } else { "measured" }), array);
     }
     let shard = "source/c/0/0";
-    let beyond = |store: &Path| drop(std::fs::copy(larger.join(shard), store.join(shard)).unwrap());
+    let beyond = |store: &Path| assert!(std::fs::copy(larger.join(shard), store.join(shard)).is_ok());
     refused(&big, beyond, show("measured"), "source: got texel");
     fail(&mut show("measured")(&folder.path().join("nothing")), 66);
 }

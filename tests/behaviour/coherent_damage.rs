@@ -218,7 +218,7 @@ fn a_damaged_enlarged_index_is_refused() {
         ("recipe/source", Some(json!("yes")), "source"),
         ("recipe/source", None, "texel"),
         ("recipe/model", Some(json!("0123")), "another model"),
-        ("recipe", Some(json!([])), "fit"),
+        ("recipe", Some(json!([])), "texel"),
         ("kind", Some(json!("model")), ""),
         ("kind", Some(json!(1)), "kind"),
         ("format", Some(json!(1000)), "format"),

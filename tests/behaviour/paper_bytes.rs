@@ -12,14 +12,24 @@ use crate::fixture::{btf, fixture, succeed, tree};
 /// `--method`: of the fixture's sample, `btf tile --tile 40x36`, `btf normals`, `btf fit` with these settings,
 /// `btf cluster --clusters 24`, and `btf enlarge` with those.
 const EXPECTED: [(&str, &[&str], &[&str], &str); 3] = [
-    ("3d", &["--mrf", "3d"], &["--size", "530x600"], ""),
+    (
+        "3d",
+        &["--mrf", "3d"],
+        &["--size", "530x600"],
+        "c77ceb409c93abc12f3f765d66579bb834467f8663e3d5e8f94fe11187f8478d",
+    ),
     (
         "2d",
         &["--mrf", "2d", "--marginals", "channel"],
         &["--size", "256x192", "--tileable", "--seed", "9"],
-        "",
+        "36729d4afebf0eec34865b46f81d1c279aaa70d23a35df68fddba7dbef158139",
     ),
-    ("slopes", &["--field", "slopes"], &["--size", "90x1100", "--candidates", "4"], ""),
+    (
+        "slopes",
+        &["--field", "slopes"],
+        &["--size", "90x1100", "--candidates", "4"],
+        "352eab4eadf13111bb5a9c097ded3dc88a40231fb23619ea5db0f6c301380d74",
+    ),
 ];
 
 #[test]

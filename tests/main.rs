@@ -11,6 +11,12 @@ mod baselines;
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/coherent.rs"]
+mod coherent;
+#[path = "behaviour/coherent_damage.rs"]
+mod coherent_damage;
+#[path = "behaviour/coherent_example.rs"]
+mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
@@ -30,6 +36,8 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/paper_bytes.rs"]
+mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]

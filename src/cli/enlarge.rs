@@ -114,7 +114,7 @@ impl Enlarge {
         }
         for report in plan.run(context)? {
             tell.line(format!(
-                "{}: {} from seed {}; {} {}s written, {} found done",
+                "{}: {} from seed {}; {} {} written, {} found done",
                 report.output.display(),
                 self.size,
                 report.seed,

@@ -35,6 +35,8 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
             "--size",
             "64x64",
             "--keep-normals",
+            "--method",
+            "paper",
         ]),
         65,
     );
@@ -64,6 +66,7 @@ fn the_stages_one_by_one_make_the_model_of_one_go() {
     succeed(btf().arg("normals").args([&fixture.measurement(), &model]));
     succeed(btf().arg("fit").arg(&model));
     succeed(btf().arg("cluster").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    succeed(btf().arg("appearance").arg(&model));
     let (mut one_by_one, mut one_go) = (tree(&model), tree(&fixture.model()));
     let attributes = |tree: &mut std::collections::BTreeMap<_, Vec<u8>>| -> serde_json::Value {
         serde_json::from_slice(&tree.remove(std::path::Path::new("zarr.json")).unwrap()).unwrap()
@@ -111,6 +114,8 @@ fn usage_errors_exit_with_2() {
             "paper",
             "--candidates",
             "0",
+            "--method",
+            "paper",
         ]),
         2,
     );
@@ -133,7 +138,14 @@ fn a_model_that_lost_an_array_is_mended_by_the_same_command() {
     let run = || succeed(&mut model_of(&fixture.measurement(), &model));
     run();
     let whole = tree(&model);
-    for lost in ["index/c/0/0", "mrf/level_0/gamma/c/0/0", "tile_source/zarr.json", "normals/c/0/0/0"] {
+    for lost in [
+        "index/c/0/0",
+        "mrf/level_0/gamma/c/0/0",
+        "tile_source/zarr.json",
+        "normals/c/0/0/0",
+        "appearance/features/zarr.json",
+        "appearance/level_1/basis/c/0/0",
+    ] {
         std::fs::remove_file(model.join(lost)).unwrap();
         run();
         assert_eq!(whole, tree(&model), "{lost}");

@@ -82,7 +82,7 @@ struct Units {
 trait Rule {
     /// Its name in recipes.
     fn method(&self) -> Method;
-    /// What a unit of an output is, and how many there are.
+    /// What the units of an output are, in the plural, and how many there are.
     fn units(&self, subject: &Subject) -> (&'static str, usize);
     /// What the bytes of an output depend on, beside the model, the size, the seed and whether it joins at its borders.
     fn recipe(&self) -> Map<String, Value>;
@@ -112,7 +112,7 @@ pub struct Report {
     pub stored_bytes: u64,
     /// Bytes of the enlarged BTF's raw samples.
     pub raw_bytes: u64,
-    /// What is done at once and either done or not.
+    /// What its units are, in the plural: each is done at once, and either done or not.
     pub unit: &'static str,
     /// Units found done.
     pub found: usize,

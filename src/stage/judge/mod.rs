@@ -5,7 +5,6 @@
 mod crops;
 mod normals;
 mod pairs;
-mod quick;
 mod report;
 mod sheet;
 mod subject;
@@ -29,7 +28,6 @@ use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::texel::tile::Tile;
 pub use crops::Origin;
-pub use quick::{Quick, quick};
 pub use report::{LatticePeak, NormalRows, Normals, Pair, Report, Row, Rows};
 use sheet::Panels;
 use subject::Subject;

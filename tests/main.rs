@@ -5,10 +5,18 @@
 mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
+#[path = "behaviour/baselines.rs"]
+mod baselines;
 #[path = "behaviour/check.rs"]
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/coherent.rs"]
+mod coherent;
+#[path = "behaviour/coherent_damage.rs"]
+mod coherent_damage;
+#[path = "behaviour/coherent_example.rs"]
+mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
@@ -28,11 +36,15 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/paper_bytes.rs"]
+mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/tiles.rs"]
+mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;

@@ -18,6 +18,7 @@ mod sample;
 mod scene;
 mod source;
 mod table;
+mod tile;
 mod verify;
 
 use std::io::Write;
@@ -88,7 +89,7 @@ enum Command {
     Verify(verify::Verify),
     Export(export::Export),
     Model(analyse::Whole),
-    Tile(analyse::Tile),
+    Tile(tile::Tile),
     Cluster(analyse::Cluster),
     Curve(curve::Curve),
     Normals(analyse::Normals),

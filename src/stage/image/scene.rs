@@ -396,7 +396,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
                 "{} does not say which texel of the tile each of its texels is",
                 options.source.display()
             ))
-            .hint("enlarge by --method coherent, without --no-source"));
+            .hint("enlarge by another --method than paper, without --no-source"));
         }
     };
     Ok((source, size))

@@ -293,17 +293,21 @@ fn lattice_peak(found: &[Found]) -> Option<LatticePeak> {
     (!peaks.is_empty()).then(|| LatticePeak { enlarged: mean(0), own: mean(1) })
 }
 
+/// The window in the middle of a plane, of at most so many texels a side.
+fn middle(plane: Size, most: usize) -> Window {
+    let size = Size::new(plane.height.min(most), plane.width.min(most));
+    Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
+}
+
 /// Wavy bands in a window in the middle.
 fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Option<f64>; 2]> {
-    let Size { height, width } = subject.size();
-    let size = Size::new(height.min(WAVY_SIDE), width.min(WAVY_SIDE));
-    let window = Window { y: (height - size.height) / 2, x: (width - size.width) / 2, size };
+    let window = middle(subject.size(), WAVY_SIDE);
     let texels = subject.texels(window, material.clusters, material.tile)?;
     let values = match texels.source {
         Some(source) => source.iter().map(|&texel| codes.tile[texel as usize]).collect::<Vec<_>>(),
         None => texels.index.iter().map(|&cluster| codes.clusters[usize::from(cluster)]).collect(),
     };
-    Ok(wavy_bands(&Lightness::of_codes(size, values), material.exemplar.size))
+    Ok(wavy_bands(&Lightness::of_codes(window.size, values), material.exemplar.size))
 }
 
 fn told(measurement: &Measurement, [view, light]: [usize; 2], found: &Found) -> Pair {

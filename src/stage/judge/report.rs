@@ -16,9 +16,9 @@ pub struct Report {
     pub subject: PathBuf,
     /// Its rows and columns.
     pub size: [usize; 2],
-    /// The measurement that it was judged by, and the digest of its recipe.
+    /// The measurement that it was judged by.
     pub measurement: PathBuf,
-    /// Its digest.
+    /// The digest of that measurement.
     pub measurement_digest: String,
     /// First row and column of the exemplar in the tile, its rows and columns.
     pub exemplar: [usize; 4],

@@ -5,6 +5,8 @@
 mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
+#[path = "behaviour/baselines.rs"]
+mod baselines;
 #[path = "behaviour/check.rs"]
 mod check;
 #[path = "behaviour/clusters.rs"]
@@ -30,6 +32,8 @@ mod fixture;
 mod hdf5;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
+#[path = "behaviour/judging.rs"]
+mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
 #[path = "behaviour/paper_bytes.rs"]
@@ -40,5 +44,7 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/tiles.rs"]
+mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;

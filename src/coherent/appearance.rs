@@ -77,9 +77,14 @@ const REPETITION_MOST: i32 = 1 << 22;
 /// The square of a deviation of the first dimension (127 / 4, three times over as sums are) in each of four neighbours.
 const REPETITION: i32 = 9 * 4 * 32 * 32;
 
-/// Passes of correction that a level is given.
+/// Passes of correction that a level is given. Coarse levels decide what lies where, have few texels, and gain from more;
+/// at fine ones more passes copy larger pieces and bring little.
 pub fn passes_of(level: usize) -> usize {
-    if level == 0 { 1 } else { 2 }
+    match level {
+        0 => 1,
+        1 | 2 => 2,
+        _ => 4,
+    }
 }
 
 /// What repetition is made to cost at a level.

@@ -33,6 +33,14 @@ pub enum Method {
     Paper,
     /// Source positions that continue their neighbours, from coarse to fine.
     Coherent,
+    /// The tile again and again.
+    Repeat,
+    /// Tiles of one border, laid at random.
+    Tiles,
+    /// Patches of the tile at random places, stitched on a grid.
+    Roller,
+    /// Image quilting.
+    Quilt,
 }
 
 impl Method {
@@ -41,6 +49,7 @@ impl Method {
         match self {
             Self::Paper => &[Stage::Cluster, Stage::Fit],
             Self::Coherent => &[Stage::Cluster, Stage::Appearance],
+            Self::Repeat | Self::Tiles | Self::Roller | Self::Quilt => &[Stage::Cluster],
         }
     }
 }

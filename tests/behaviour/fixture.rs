@@ -27,6 +27,13 @@ impl Fixture {
     }
 }
 
+/// The command that makes the fixture's model: of a tile whose borders join.
+pub fn model_of(measurement: &Path, model: &Path) -> Command {
+    let mut command = btf();
+    command.arg("model").args([measurement, model]).args(["--tile", "cut", "--clusters", "24"]);
+    command
+}
+
 /// The size of the fixture's enlarged index: two rows of shards, neither size a multiple of a shard.
 pub const ENLARGED: [usize; 2] = [700, 530];
 
@@ -40,7 +47,7 @@ pub fn fixture() -> &'static Fixture {
             btf().arg("sample").arg(&archive).args(["--size", "56x48", "--views", "9", "--lights", "19"]),
         );
         succeed(btf().arg("import").args([&archive, &measurement]));
-        succeed(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        succeed(&mut model_of(&measurement, &model));
         succeed(&mut enlarge(&model, &enlarged));
         fixture
     })

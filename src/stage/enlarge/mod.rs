@@ -2,9 +2,12 @@
 //!
 //! A [`Rule`] is a method with its options, opened on a model; the plan names the outputs and hands each to the rule.
 
+mod blocks;
 pub mod coherent;
 pub mod paper;
+pub mod patches;
 mod pipeline;
+pub mod quilt;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -47,6 +50,10 @@ pub enum By {
     Paper(paper::Options),
     /// Source positions that continue their neighbours.
     Coherent(coherent::Options),
+    /// Pieces of the tile on a grid.
+    Patches(patches::Options),
+    /// Image quilting.
+    Quilt(quilt::Options),
 }
 
 /// What all methods are given of a model and of the options.
@@ -122,6 +129,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let rule: Box<dyn Rule> = match &options.by {
         By::Paper(by) => Box::new(paper::Paper::open(&subject, by)?),
         By::Coherent(by) => Box::new(coherent::Coherent::open(&subject, by)?),
+        By::Patches(by) => Box::new(patches::Patches::open(&subject, by)?),
+        By::Quilt(by) => Box::new(quilt::Quilting::open(&subject, by)?),
     };
     let several = options.seeds.start() != options.seeds.end();
     let output = |seed: u64| {

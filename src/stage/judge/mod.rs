@@ -12,6 +12,7 @@ mod whole;
 
 use std::path::PathBuf;
 
+use btfkit_formats::Direction;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
@@ -38,6 +39,15 @@ const BAND_ROWS: usize = 16;
 
 /// Side of the window in which wavy bands are sought.
 const WAVY_SIDE: usize = 768;
+
+/// The pair (view, light) that shows relief best: the most frontal view under its lowest light.
+///
+/// # Errors
+/// No directions.
+pub(crate) fn frontal_pair(views: &[Direction], lights: &[Direction]) -> Result<[usize; 2]> {
+    let pair = pairs::spread(views, lights, 1).first().copied();
+    pair.ok_or_else(|| Error::input("got no view or no light, expected one at least"))
+}
 
 /// What to judge, and by what.
 #[derive(Clone, Debug)]
@@ -298,7 +308,7 @@ fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Op
 
 fn told(measurement: &Measurement, [view, light]: [usize; 2], found: &Found) -> Pair {
     let description = measurement.description();
-    let degrees = |direction: btfkit_formats::Direction| {
+    let degrees = |direction: Direction| {
         let (theta, phi) = direction.degrees();
         [theta, phi]
     };

@@ -23,6 +23,8 @@ mod curve;
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
+#[path = "behaviour/document_pictures.rs"]
+mod document_pictures;
 #[path = "behaviour/equations.rs"]
 mod equations;
 #[path = "behaviour/fixture.rs"]

@@ -96,7 +96,7 @@ impl<'a> Quilt<'a> {
     fn sides(tile: Size) -> [usize; 2] {
         let [least, most] = BLOCK_SIDES;
         let block = (tile.height.min(tile.width) / BLOCK_PART).clamp(least, most);
-        [block, (block / OVERLAP_PART).max(2)]
+        [block, (block / OVERLAP_PART).max(3)]
     }
 
     /// Rows from one row of blocks to the next, for a tile.

@@ -41,7 +41,7 @@ impl<'a> Roller<'a> {
     pub fn new(exemplar: &'a Exemplar, seed: u64, wrap: Option<Size>) -> Result<Self> {
         let cell = Size::new(exemplar.size.height / 2, exemplar.size.width / 2);
         check_wrap(wrap, cell, 1)?;
-        let overlap = |side: usize| (side / 4).max(2);
+        let overlap = |side: usize| (side / 3).max(2);
         let overlap = Size::new(overlap(cell.height), overlap(cell.width));
         let origins = exemplar.origins(Size::new(cell.height + overlap.height, cell.width + overlap.width));
         let hash = Hash::new(seed, u32::from_be_bytes(*b"roll"));

@@ -50,3 +50,28 @@ pub fn near_shift(picture: &Lightness, shift: [f64; 2]) -> f64 {
     let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| [y + down, x + right]));
     around.map(|shift| at_shift(picture, shift)).fold(-1.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Hash;
+
+    #[test]
+    fn what_repeats_has_a_peak_at_its_period_and_noise_has_none() {
+        let (size, hash) = (Size::new(96, 90), Hash::new(2, 0));
+        let noise = |y: usize, x: usize| hash.uniforms(y as u32, x as u32, 0)[0];
+        let picture = |value: &dyn Fn(usize, usize) -> f64| {
+            let values = (0..size.texels()).map(|n| value(n / size.width, n % size.width)).collect();
+            Lightness::new(size, values)
+        };
+        // A period of (16, 3): rows are moved to the right by 3 every 16.
+        let sheared = picture(&|y, x| noise(y % 16, (x + 90 - y / 16 * 3) % 90));
+        let rough = picture(&|y, x| noise(y, x));
+        assert!((at_shift(&sheared, [16, 3]) - 1.0).abs() < 1e-9);
+        assert!((at_shift(&sheared, [-16, -3]) - 1.0).abs() < 1e-9);
+        assert!(near_shift(&sheared, [15.4, 3.6]) > 0.999 && at_shift(&sheared, [16, -3]) < 0.2);
+        assert!(far_peak(&picture(&|y, x| noise(y % 16, x))) > 0.999 && far_peak(&rough) < 0.2);
+        assert!(near_shift(&rough, [16.0, 3.0]) < 0.2 && at_shift(&rough, [96, 0]) == 0.0);
+        assert_eq!(far_peak(&picture(&|_, _| 4.0)), 0.0);
+    }
+}

@@ -19,7 +19,6 @@ pub struct LargestCopy {
 impl LargestCopy {
     /// Of an enlargement whose sources are `row * tile_width + column` of the tile, within an exemplar that wraps or not.
     pub fn new(exemplar: Window, tile_width: usize, wraps: bool) -> Self {
-        let exemplar = Window { size: exemplar.size, ..exemplar };
         Self {
             exemplar,
             tile_width: tile_width.max(1),

@@ -4,9 +4,11 @@ use serde::{Deserialize, Serialize};
 use super::co_occurrence::{Edges, edges};
 use super::{LEAST_SIDE, Lightness, Measure, Statistics};
 use crate::error::{Error, Result};
+use crate::shape::Size;
 
 /// Real crops of a material, and how far they are from each other.
 pub struct Judge {
+    size: Size,
     edges: Edges,
     reals: Vec<Statistics>,
     floor: [f64; Measure::ALL.len()],
@@ -53,7 +55,7 @@ impl Judge {
         let distances: Vec<_> = pairs.par_iter().map(|&(i, j)| reals[i].distances(&reals[j])).collect();
         let floor = means(&distances);
         match floor.iter().position(|distance| *distance <= 0.0) {
-            None => Ok(Self { edges, reals, floor }),
+            None => Ok(Self { size: first.size, edges, reals, floor }),
             Some(at) => Err(Error::input(format!(
                 "the real crops do not differ in {}: are they the same?",
                 Measure::ALL[at].name()
@@ -71,11 +73,11 @@ impl Judge {
     /// # Errors
     /// No picture, or one of another size than the real crops.
     pub fn judge(&self, pictures: &[Lightness]) -> Result<Judgement> {
-        if pictures.is_empty()
-            || pictures.iter().any(|picture| picture.size.height.min(picture.size.width) < LEAST_SIDE)
-        {
+        if pictures.is_empty() || pictures.iter().any(|picture| picture.size != self.size) {
+            let sizes: Vec<String> = pictures.iter().map(|picture| picture.size.to_string()).collect();
             return Err(Error::usage(format!(
-                "expected pictures of at least {LEAST_SIDE} texels a side to judge"
+                "got pictures of {sizes:?} to judge, expected at least one, each of {} as the real crops",
+                self.size
             )));
         }
         let found: Vec<Statistics> =
@@ -84,8 +86,7 @@ impl Judge {
         let distances: Vec<_> = pairs.par_iter().map(|(a, b)| a.distances(b)).collect();
         let distances = means(&distances);
         let measures = std::array::from_fn(|n| distances[n] / self.floor[n]);
-        let worst =
-            (1..measures.len()).fold(0, |worst, n| if measures[n] > measures[worst] { n } else { worst });
+        let worst = largest(&measures);
         let peak = |statistics: &[Statistics]| {
             statistics.iter().map(Statistics::peak).sum::<f64>() / statistics.len() as f64
         };
@@ -105,8 +106,7 @@ impl Judgement {
             return None;
         }
         let measures = means(&judgements.iter().map(|judgement| judgement.measures).collect::<Vec<_>>());
-        let worst =
-            (1..measures.len()).fold(0, |worst, n| if measures[n] > measures[worst] { n } else { worst });
+        let worst = largest(&measures);
         let of =
             |value: fn(&Self) -> f64| judgements.iter().map(value).sum::<f64>() / judgements.len() as f64;
         Some(Self {
@@ -116,6 +116,11 @@ impl Judgement {
             excess_peak: of(|judgement| judgement.excess_peak),
         })
     }
+}
+
+/// Number of the largest value, the first of equals.
+fn largest(values: &[f64]) -> usize {
+    (1..values.len()).fold(0, |largest, n| if values[n] > values[largest] { n } else { largest })
 }
 
 /// Means of rows.

@@ -11,12 +11,20 @@ mod baselines;
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/coherent.rs"]
+mod coherent;
+#[path = "behaviour/coherent_damage.rs"]
+mod coherent_damage;
+#[path = "behaviour/coherent_example.rs"]
+mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
+#[path = "behaviour/document_pictures.rs"]
+mod document_pictures;
 #[path = "behaviour/equations.rs"]
 mod equations;
 #[path = "behaviour/fixture.rs"]
@@ -26,13 +34,19 @@ mod fixture;
 mod hdf5;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
+#[path = "behaviour/judging.rs"]
+mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/paper_bytes.rs"]
+mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/tiles.rs"]
+mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;

@@ -2,12 +2,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use btfkit::error::{Error, Result};
-use btfkit::lattice::LatticeChoice;
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::stage::cluster::{Amount, Step, Stepped};
 use btfkit::stage::import::Shard;
-use btfkit::stage::{cluster, compare, image, normals, tile};
+use btfkit::stage::{cluster, compare, image, normals};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use btfkit::texel::cluster::centre::CentreRule;
@@ -18,14 +17,8 @@ use clap::{Args, ValueEnum};
 use super::appearance::{appearance_plan, tell_appearance};
 use super::fit::{FitOptions, fit_plan, tell_field};
 use super::table::{row, table};
+use super::tile::{Seed, TileOptions, tell_tile, tile_plan};
 use super::{Tell, bytes_text};
-
-#[derive(Args)]
-struct TileOptions {
-    /// What to take as the tile: auto, none (all, borders do not join), periodic (all, they do) or WIDTHxHEIGHT
-    #[arg(long, default_value = "auto")]
-    tile: tile::Choice,
-}
 
 #[derive(Args)]
 struct ClusterOptions {
@@ -86,19 +79,13 @@ struct NormalsOptions {
     robust: bool,
 }
 
-#[derive(Args)]
-struct Seed {
-    /// Seed of all that is drawn at random
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
-
 /// Measurement to model: tile, clusters, normals and random field in one go
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf model wood.zarr wood.model.zarr
   btf model leather.zarr --clusters 128 --mrf 2d --tile 128x128
+  btf model cloth.zarr --lattice '15.2,0;0,18.4'
 Stages that are done by the same recipe are not run again.")]
 pub(super) struct Whole {
     /// The measurement
@@ -116,22 +103,6 @@ pub(super) struct Whole {
     #[command(flatten)]
     seed: Seed,
     /// Only say what would be done first
-    #[arg(long)]
-    dry_run: bool,
-}
-
-/// Cut a seamless tile from a measurement; begins a model
-#[derive(Args)]
-pub(super) struct Tile {
-    /// The measurement
-    measurement: PathBuf,
-    /// The model to begin
-    model: PathBuf,
-    #[command(flatten)]
-    options: TileOptions,
-    #[command(flatten)]
-    seed: Seed,
-    /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
 }
@@ -233,18 +204,7 @@ impl Whole {
         tell_normals(&plan.run(context)?, tell);
         let plan = fit_plan(&model, &self.fit)?;
         tell_field(&plan.run(context)?, tell);
-        tell_appearance(&appearance_plan(&model, &LatticeChoice::Auto)?.run(context)?, tell);
-        Ok(())
-    }
-}
-
-impl Tile {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let plan = tile_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
-        if self.dry_run {
-            return tell.plan(&plan.summary());
-        }
-        tell_tile(&plan.run(context)?, tell);
+        tell_appearance(&appearance_plan(&model, &self.tile.lattice)?.run(context)?, tell);
         Ok(())
     }
 }
@@ -291,15 +251,6 @@ impl Normals {
         tell_normals(&plan.run(context)?, tell);
         Ok(())
     }
-}
-
-fn tile_plan(measurement: &Path, model: &Path, options: &TileOptions, seed: u64) -> Result<tile::Plan> {
-    tile::plan(&tile::Options {
-        measurement: measurement.into(),
-        model: model.into(),
-        choice: options.tile,
-        seed,
-    })
 }
 
 /// Clusters, or takes the clusters of another model.
@@ -355,22 +306,6 @@ fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> R
         model: model.into(),
         robust: options.robust,
     })
-}
-
-fn tell_tile(report: &tile::Report, tell: Tell) {
-    let [height, width] = report.size;
-    let seams = match &report.patch {
-        Some(patch) => format!(
-            "from row {}, column {}; step across its seams {:.2} of an ordinary one (uncut {:.2})",
-            patch.y, patch.x, report.seam_visibility, report.uncut_visibility
-        ),
-        None if report.wraps => format!(
-            "the whole measurement; step across its borders {:.2} of an ordinary one",
-            report.seam_visibility
-        ),
-        None => "the whole measurement, its borders do not join".to_owned(),
-    };
-    tell.line(format!("tile      {width}x{height} {seams}"));
 }
 
 fn tell_clusters(report: &cluster::Report, tell: Tell) {

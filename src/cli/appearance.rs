@@ -9,8 +9,8 @@ use clap::Args;
 
 use super::Tell;
 
-/// Fewer cells than this repeat visibly.
-const FEW_CELLS: u64 = 16;
+/// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
+const FEW_CELLS: u64 = 4;
 
 /// Describe how a model's exemplar looks, for `btf enlarge`
 #[derive(Args)]
@@ -51,16 +51,20 @@ pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
         "exemplar  {width}x{height}, described at {} levels from 1 to {coarsest} texels apart",
         report.levels.len()
     ));
-    let cells = WaveCounts(report.lattice.clone()).cells();
+    let counts = WaveCounts(report.lattice.clone());
+    let cells = counts.cells();
     tell.line(match (report.found.as_str(), report.lattice.len()) {
-        ("none", _) => "          no lattice: the material is irregular".to_owned(),
+        ("none", _) => "          no lattice in it".to_owned(),
         (found, 0) => {
             format!("          lattice {found}, not used: the exemplar is no whole number of its cells")
         }
         (found, 1) => format!("          ribs, a period of {found} texels (rows, columns), {cells} of them"),
         (found, _) => format!("          lattice of {found} texels (rows, columns), {cells} cells"),
     });
-    if !report.lattice.is_empty() && cells < FEW_CELLS {
-        tell.line("          few cells: large pieces of an enlargement will be copies; measure a larger part if you can");
+    let fewest = counts.fewest_in_a_direction();
+    if !report.lattice.is_empty() && fewest < FEW_CELLS {
+        tell.line(format!(
+            "          only {fewest} in a direction: large pieces of an enlargement will be copies; measure a larger part if you can, or let it bend by --lattice none"
+        ));
     }
 }

@@ -6,7 +6,7 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::enlarge::patches::Pieces;
-use btfkit::stage::enlarge::{self, By, coherent, paper, patches, quilt};
+use btfkit::stage::enlarge::{self, By, Verdict, coherent, paper, patches, quilt};
 use btfkit::stage::import::Shard;
 use clap::{Args, ValueEnum};
 
@@ -114,7 +114,7 @@ impl Enlarge {
         }
         for report in plan.run(context)? {
             tell.line(format!(
-                "{}: {} from seed {}; {} {}s written, {} found done",
+                "{}: {} from seed {}; {} {} written, {} found done",
                 report.output.display(),
                 self.size,
                 report.seed,
@@ -128,6 +128,9 @@ impl Enlarge {
                 report.raw_bytes as f64 / report.stored_bytes as f64,
                 bytes_text(report.raw_bytes)
             ));
+            if let Some(verdict) = &report.verdict {
+                tell_verdict(verdict, tell);
+            }
         }
         Ok(())
     }
@@ -173,6 +176,22 @@ impl Enlarge {
             Method::Roller => pieces(Pieces::Roller),
             Method::Quilt => By::Quilt(quilt::Options { keep_source, keep_normals }),
         }
+    }
+}
+
+/// One line on whether an enlargement looks like its tile, and one for each warning.
+fn tell_verdict(verdict: &Verdict, tell: Tell) {
+    let copy = match verdict.largest_copy {
+        Some(copy) => format!(", largest unbroken copy {:.1} % of the middle", 100.0 * copy),
+        None => String::new(),
+    };
+    tell.line(format!(
+        "likeness  {:.0} % of the clusters' shares as in the tile, repetition {:+.2}{copy}",
+        100.0 * verdict.shares,
+        verdict.excess_peak
+    ));
+    for warning in &verdict.warnings {
+        tell.line(format!("warning   {warning}"));
     }
 }
 

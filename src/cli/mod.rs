@@ -12,11 +12,13 @@ mod fit;
 mod image;
 mod import;
 mod info;
+mod judge;
 mod progress;
 mod sample;
 mod scene;
 mod source;
 mod table;
+mod tile;
 mod verify;
 
 use std::io::Write;
@@ -87,7 +89,7 @@ enum Command {
     Verify(verify::Verify),
     Export(export::Export),
     Model(analyse::Whole),
-    Tile(analyse::Tile),
+    Tile(tile::Tile),
     Cluster(analyse::Cluster),
     Curve(curve::Curve),
     Normals(analyse::Normals),
@@ -96,6 +98,7 @@ enum Command {
     Compare(analyse::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Judge(judge::Judge),
 }
 
 /// Runs the program.
@@ -152,6 +155,7 @@ impl Command {
             Self::Compare(command) => command.run(context, tell),
             Self::Enlarge(command) => command.run(context, tell),
             Self::Image(command) => command.run(context, tell),
+            Self::Judge(command) => command.run(context, tell),
         }
     }
 }

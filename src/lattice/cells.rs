@@ -1,5 +1,7 @@
 //! How a rectangle relates to a lattice: whole numbers of cells, or not.
 
+use std::ops::RangeInclusive;
+
 use super::Lattice;
 use crate::shape::{Size, Window};
 
@@ -11,6 +13,10 @@ const LEAST_PART: f64 = 0.5;
 
 /// Parts of a side that are given up for a misfit less by one cell.
 const MISFIT_COST: f64 = 2.0;
+
+/// How far, in texels, a side may be from a shift of the lattice: the first of these within which there is one. Half a
+/// texel is rounding; oblique lattices have few shifts along the axes that are nearer.
+const NEAR: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// A lattice in whole numbers for a rectangle that it fits: for each wave of the lattice its cycles down the height and
 /// across the width. None for no lattice, one for ribs, two for cells.
@@ -51,6 +57,13 @@ impl WaveCounts {
             _ => 0,
         }
     }
+
+    /// Cells that follow each other along the longer way across the rectangle, in the direction that has fewest; 0
+    /// without a lattice.
+    pub fn fewest_in_a_direction(&self) -> u64 {
+        let longer = |&[down, across]: &[i32; 2]| u64::from(down.unsigned_abs().max(across.unsigned_abs()));
+        self.0.iter().map(longer).min().unwrap_or(0)
+    }
 }
 
 /// The lattice in whole numbers for a rectangle of this size; `None` where its sides do not hold whole numbers of cells
@@ -78,6 +91,27 @@ pub fn misfit(waves: &[[f64; 2]], axis: usize, side: usize) -> f64 {
         (cycles - cycles.round()).abs()
     };
     waves.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Whether a side holds whole numbers of cells to within so many texels. The height is axis 0, the width axis 1.
+fn holds_cells(lattice: &Lattice, axis: usize, side: usize, near: f64) -> bool {
+    let mut off = [0.0; 2];
+    for (wave, vector) in lattice.waves().into_iter().zip(lattice.shortest()) {
+        let cycles = wave[axis] * side as f64;
+        let part = cycles - cycles.round();
+        if part.abs() > TOLERANCE {
+            return false;
+        }
+        off = [off[0] + part * vector[0], off[1] + part * vector[1]];
+    }
+    super::length(off) <= near
+}
+
+/// The sides in a range that hold whole numbers of cells as nearly as can be: to half a texel, where there are none to
+/// one, else to two. All of them where there is no lattice. The height is axis 0, the width axis 1.
+pub fn whole_cell_sides(lattice: &Lattice, axis: usize, sides: RangeInclusive<usize>) -> Vec<usize> {
+    let within = |near| sides.clone().filter(|&side| holds_cells(lattice, axis, side, near)).collect();
+    NEAR.into_iter().map(within).find(|sides: &Vec<usize>| !sides.is_empty()).unwrap_or_default()
 }
 
 /// The largest centred rectangle of a plane whose sides hold whole numbers of cells as nearly as can be: a tenth of a
@@ -179,5 +213,39 @@ mod tests {
             let worst = misfit(&waves, 0, found.size.height).max(misfit(&waves, 1, found.size.width));
             assert!(worst < 0.2, "{text}: {found:?} misses by {worst}");
         }
+    }
+
+    #[test]
+    fn sides_of_whole_cells_are_as_near_as_texels_allow() {
+        let sides = |text: &str, axis, range| whole_cell_sides(&lattice(text), axis, range);
+        // 15.2 k: 91.2, 106.4 and so on, each rounded.
+        assert_eq!(sides("15.2,0;0,18.4", 0, 85..=140), [91, 106, 122, 137]);
+        assert_eq!(sides("15.2,0;0,18.4", 1, 85..=140), [92, 110, 129]);
+        assert_eq!(sides("0,23.12", 1, 100..=150), [116, 139]);
+        assert_eq!(sides("0,23.12", 0, 100..=110), (100..=110).collect::<Vec<_>>());
+        assert_eq!(sides("none", 0, 7..=9), [7, 8, 9]);
+        assert!(sides("300,0;0,30", 0, 100..=200).is_empty());
+        // A lattice turned by 3/4: 5 cells of 10 x 10 along the axes.
+        assert_eq!(sides("8,6;-6,8", 0, 40..=110), [50, 100]);
+        // An oblique one has no shift as near as half a texel in this range, but some within two.
+        let lattice = lattice("5.94,-8.22;12.55,7.54");
+        let near = |near| (100..=140).filter(|&side| holds_cells(&lattice, 0, side, near)).count();
+        let found = whole_cell_sides(&lattice, 0, 100..=140);
+        assert_eq!(found.len(), NEAR.into_iter().map(near).find(|&n| n > 0).unwrap(), "{found:?}");
+        for side in found {
+            assert!(
+                wave_counts(&lattice, Size::new(side, side)).is_some()
+                    || misfit(&lattice.waves(), 1, side) > 0.3
+            );
+        }
+    }
+
+    #[test]
+    fn the_direction_of_fewest_cells_is_told() {
+        let fewest = |rows: &[[i32; 2]]| WaveCounts(rows.to_vec()).fewest_in_a_direction();
+        assert_eq!(
+            [fewest(&[]), fewest(&[[0, 9]]), fewest(&[[1, 0], [0, 20]]), fewest(&[[11, -19], [12, 9]])],
+            [0, 9, 1, 12]
+        );
     }
 }

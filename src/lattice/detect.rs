@@ -89,7 +89,9 @@ pub fn detect(size: Size, dims: usize, features: &[f32], wraps: bool) -> Detecti
 
 /// A lattice whose vectors point down, those across to the right even if they rise a little.
 fn downward(lattice: Lattice) -> Lattice {
-    let turned = |[dy, dx]: [f64; 2]| if dy + dx / 8.0 < 0.0 { [-dy, -dx] } else { [dy, dx] };
+    // Adding 0 turns -0 into 0.
+    let turned =
+        |[dy, dx]: [f64; 2]| if dy + dx / 8.0 < 0.0 { [0.0 - dy, 0.0 - dx] } else { [dy + 0.0, dx + 0.0] };
     match lattice {
         Lattice::None => Lattice::None,
         Lattice::OneDirection { period } => Lattice::OneDirection { period: turned(period) },

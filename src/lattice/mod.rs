@@ -13,17 +13,18 @@ mod smooth;
 #[cfg(test)]
 mod tests;
 
-pub use cells::{WaveCounts, largest_whole_cells, wave_counts};
+pub use cells::{WaveCounts, largest_whole_cells, wave_counts, whole_cell_sides};
 pub use detect::{Detection, detect};
 pub use given::LatticeChoice;
 
 use serde::{Deserialize, Serialize};
 
 /// Shifts (dy, dx), in texels, that leave a texture as it is. Stored as a list of zero, one or two vectors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(into = "Vec<[f64; 2]>", try_from = "Vec<[f64; 2]>")]
 pub enum Lattice {
     /// No shift does.
+    #[default]
     None,
     /// Ribs: whole multiples of a period, and any shift across it.
     OneDirection {
@@ -41,6 +42,14 @@ impl Lattice {
             Self::None => Vec::new(),
             Self::OneDirection { period } => vec![period],
             Self::TwoDirections(vectors) => vectors.to_vec(),
+        }
+    }
+
+    /// The shortest vectors, to which [`Lattice::waves`] is the dual basis: wave k brings vector k forward by one cycle.
+    fn shortest(&self) -> Vec<[f64; 2]> {
+        match *self {
+            Self::TwoDirections(vectors) => reduced(vectors).to_vec(),
+            _ => self.vectors(),
         }
     }
 

@@ -21,6 +21,9 @@ pub const SHARD_SIDE: usize = 512;
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
 
+/// Longest side of an index, as of every [`Size`] that is given as text.
+const MOST_SIDE: u64 = 1 << 24;
+
 /// How an index was enlarged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -116,9 +119,11 @@ impl Enlarged {
         let store = Store::at(path);
         let attributes = store.expect(KIND)?;
         let index = store.open_array("index")?;
-        let &[height, width] = index.shape() else {
+        let (&[height, width], true) =
+            (index.shape(), index.shape().iter().all(|n| (1..=MOST_SIDE).contains(n)))
+        else {
             return Err(Error::input(format!(
-                "{}: index: got shape {:?}, expected [y, x]",
+                "{}: index: got shape {:?}, expected [y, x], each from 1 to {MOST_SIDE}",
                 path.display(),
                 index.shape()
             )));

@@ -6,7 +6,7 @@ use btfkit::store::measurement::Measurement;
 use btfkit_formats::picture::{self, Picture};
 use btfkit_formats::{SampleType, Samples, f16};
 
-use crate::fixture::{assert_same, btf, fail, fixture, succeed, tree, unpack};
+use crate::fixture::{assert_same, btf, fail, fixture, model_of, succeed, tree, unpack};
 
 /// Samples of a measurement's view.
 fn view(store: &Path, view: usize) -> Samples {
@@ -191,7 +191,7 @@ fn floats_go_through_the_whole_method() {
     let archive = fixture().archive();
     let [store, model, big] = ["f.zarr", "f.model.zarr", "f.big.zarr"].map(|name| folder.path().join(name));
     import(&[&archive], &store, &["--samples", "f32"]);
-    succeed(btf().arg("model").args([&store, &model]).args(["--clusters", "24"]));
+    succeed(&mut model_of(&store, &model));
     succeed(btf().arg("enlarge").args([&model, &big]).args(["--size", "64x64"]));
     succeed(
         btf()

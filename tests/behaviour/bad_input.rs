@@ -260,7 +260,8 @@ fn no_flipped_bit_of_a_models_metadata_brings_the_reader_down() {
         let model = Model::open(&path)?;
         let (_, _, _, _) = (model.tile()?, model.index()?, model.normals()?, model.distance()?);
         let (_, _, _) = (model.representatives()?, model.surface()?, model.triangles()?);
-        model.digest_of(&[Stage::Cluster, Stage::Fit]).map(drop)
+        model.appearance()?;
+        model.digest_of(&[Stage::Cluster, Stage::Fit, Stage::Appearance]).map(drop)
     };
     read().unwrap();
     let mut refused = 0;
@@ -277,6 +278,9 @@ fn no_flipped_bit_of_a_models_metadata_brings_the_reader_down() {
         "mrf/marginals/zarr.json",
         "mrf/level_0/gamma/zarr.json",
         "mrf/level_0/neighbourhood/zarr.json",
+        "appearance/features/zarr.json",
+        "appearance/level_0/basis/zarr.json",
+        "appearance/level_1/offset/zarr.json",
     ] {
         let file = path.join(file);
         let whole = std::fs::read(&file).unwrap();

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use crate::fixture::{assert_same, btf, enlarge, fixture, succeed, unpack};
+use crate::fixture::{assert_same, btf, enlarge, fixture, model_of, succeed, unpack};
 
 #[test]
 fn threads_and_kernels_change_no_byte() {
@@ -14,7 +14,7 @@ fn threads_and_kernels_change_no_byte() {
             succeed(command.env("BTFKIT_KERNEL", kernel).args(["--threads", threads]))
         };
         run(btf().arg("import").args([&fixture().archive(), &measurement]));
-        run(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        run(&mut model_of(&measurement, &model));
         run(&mut enlarge(&model, &enlarged));
     }
     let [one, three] = ["one", "three"].map(|name| folder.path().join(name));
@@ -49,7 +49,10 @@ fn the_random_field_of_another_seed_is_another() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("other");
     succeed(
-        btf().arg("enlarge").args([&fixture().model(), &output]).args(["--size", "64x64", "--seed", "2"]),
+        btf()
+            .arg("enlarge")
+            .args([&fixture().model(), &output])
+            .args(["--method", "paper", "--size", "64x64", "--seed", "2"]),
     );
     let read = |path: &std::path::Path| {
         let store = btfkit::store::enlarged::Enlarged::open(path).unwrap();
@@ -62,7 +65,7 @@ fn the_random_field_of_another_seed_is_another() {
 fn outputs_of_a_range_of_seeds_are_those_of_each_seed() {
     let folder = tempfile::tempdir().unwrap();
     let range = folder.path().join("plane.zarr");
-    let size = ["--size", "90x70"];
+    let size = ["--method", "paper", "--size", "90x70"];
     succeed(btf().arg("enlarge").args([&fixture().model(), &range]).args(size).args(["--seed", "3..5"]));
     for seed in 3..=5 {
         let alone = folder.path().join(seed.to_string());
@@ -82,7 +85,7 @@ fn a_tileable_output_joins_at_its_borders() {
     let output = folder.path().join("tile");
     let mut command = btf();
     command.arg("enlarge").args([&fixture().model(), &output]).args(["--size", "256x192", "--keep-normals"]);
-    succeed(command.arg("--tileable"));
+    succeed(command.args(["--method", "paper", "--tileable"]));
     let store = btfkit::store::enlarged::Enlarged::open(&output).unwrap();
     let size = store.size();
     let normals = store.read_normals(size.window()).unwrap().unwrap();
@@ -105,6 +108,8 @@ fn a_tileable_output_joins_at_its_borders() {
             "--size",
             "255x192",
             "--tileable",
+            "--method",
+            "paper",
         ]),
         2,
     );

@@ -27,6 +27,13 @@ impl Fixture {
     }
 }
 
+/// The command that makes the fixture's model: of a tile whose borders join.
+pub fn model_of(measurement: &Path, model: &Path) -> Command {
+    let mut command = btf();
+    command.arg("model").args([measurement, model]).args(["--tile", "cut", "--clusters", "24"]);
+    command
+}
+
 /// The size of the fixture's enlarged index: two rows of shards, neither size a multiple of a shard.
 pub const ENLARGED: [usize; 2] = [700, 530];
 
@@ -40,7 +47,7 @@ pub fn fixture() -> &'static Fixture {
             btf().arg("sample").arg(&archive).args(["--size", "56x48", "--views", "9", "--lights", "19"]),
         );
         succeed(btf().arg("import").args([&archive, &measurement]));
-        succeed(btf().arg("model").args([&measurement, &model]).args(["--clusters", "24"]));
+        succeed(&mut model_of(&measurement, &model));
         succeed(&mut enlarge(&model, &enlarged));
         fixture
     })
@@ -52,11 +59,17 @@ pub fn btf() -> Command {
     command
 }
 
-/// The enlargement that made the fixture's, of a model to a place.
+/// The enlargement by the paper's method that made the fixture's, of a model to a place.
 pub fn enlarge(model: &Path, output: &Path) -> Command {
     let mut command = btf();
     let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-    command.arg("enlarge").args([model, output]).args(["--size", &size, "--keep-normals"]);
+    command.arg("enlarge").args([model, output]).args([
+        "--method",
+        "paper",
+        "--size",
+        &size,
+        "--keep-normals",
+    ]);
     command
 }
 

@@ -4,10 +4,12 @@ use btfkit::archive;
 use btfkit::color::LightnessCodes;
 use btfkit::lattice::{Detection, Lattice, WaveCounts, detect, largest_whole_cells, wave_counts};
 use btfkit::shape::Size;
+use btfkit::stage::tile::Report;
+use btfkit::store::model::{Model, Stage};
 use btfkit::texel::components::leading;
 use btfkit_formats::Samples;
 
-use crate::fixture::shared;
+use crate::fixture::{btf, shared, succeed};
 
 /// Directions from which a measurement is looked at.
 const SPREAD: usize = 6;
@@ -83,6 +85,41 @@ fn tiles_of_impalla_are_found_although_only_four_fit_the_plane() {
     assert_eq!(largest_whole_cells(&found.lattice, whole).map(|window| window.size), Some(whole));
     assert_eq!(wave_counts(&found.lattice, whole), Some(WaveCounts(vec![[2, 0], [0, 2]])));
     assert_eq!(wave_counts(&found.lattice, Size::new(152, 184)), None);
+}
+
+#[test]
+fn the_plane_of_impalla_and_tiles_cut_from_it_hold_whole_cells() {
+    let Some(archive) = shared("mlvq-btf/impalla/binary.btf") else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("impalla.zarr");
+    succeed(btf().arg("import").args([&archive, &store]));
+    for (choice, size, cells) in [("auto", [256, 256], 4), ("none", [256, 256], 4), ("cut", [128, 128], 1)] {
+        let model = folder.path().join(choice);
+        let told = succeed(btf().arg("tile").args([&store, &model]).args(["--tile", choice]));
+        let report: Report = Model::open(&model).unwrap().report(Stage::Tile).unwrap();
+        assert_eq!(
+            (report.size, WaveCounts(report.cells.clone()).cells()),
+            (size, cells),
+            "{choice}: {told}"
+        );
+        let Lattice::TwoDirections(vectors) = report.lattice else { panic!("{told}") };
+        for [long, short] in [vectors[0], [vectors[1][1], vectors[1][0]]] {
+            assert!((long - 128.0).abs() < 0.6 && short.abs() < 0.6, "{choice}: {told}");
+        }
+        assert_eq!(told.contains("25 % of what was measured"), choice == "cut", "{told}");
+    }
+}
+
+#[test]
+fn borders_of_planes_that_were_made_to_join_are_found_to_join() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["mlvq-btf/corduroy/binary.btf", "virtual-leather/VLEATHER64.zip"] {
+        let Some(archive) = shared(name) else { continue };
+        let store = folder.path().join(name.replace('/', "-"));
+        succeed(btf().arg("import").args([&archive, &store]));
+        let told = succeed(btf().arg("tile").args([&store, &store.with_extension("model")]));
+        assert!(told.contains("the whole measurement; step across its borders"), "{name}: {told}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Results of another recipe are refused, results of the same are kept, and what is missing is named.
 
-use crate::fixture::{btf, fail, fixture, succeed, tree};
+use crate::fixture::{btf, fail, fixture, model_of, succeed, tree};
 
 #[test]
 fn a_finished_command_run_again_changes_nothing() {
@@ -8,7 +8,7 @@ fn a_finished_command_run_again_changes_nothing() {
     let before = tree(&fixture.model());
     let told = succeed(btf().arg("import").args([&fixture.archive(), &fixture.measurement()]));
     assert!(told.contains("0 views written, 9 found done"), "{told}");
-    succeed(btf().arg("model").args([&fixture.measurement(), &fixture.model()]).args(["--clusters", "24"]));
+    succeed(&mut model_of(&fixture.measurement(), &fixture.model()));
     assert_eq!(before, tree(&fixture.model()));
 }
 
@@ -21,7 +21,12 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
     );
     assert!(import.contains("white was 1.0, now 0.5"), "{import}");
     let model = fail(
-        btf().arg("model").args([&fixture.measurement(), &fixture.model()]).args(["--clusters", "25"]),
+        btf().arg("model").args([&fixture.measurement(), &fixture.model()]).args([
+            "--tile",
+            "cut",
+            "--clusters",
+            "25",
+        ]),
         65,
     );
     assert!(model.contains("clusters was 24, now 25"), "{model}");
@@ -30,6 +35,8 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
             "--size",
             "64x64",
             "--keep-normals",
+            "--method",
+            "paper",
         ]),
         65,
     );
@@ -55,10 +62,11 @@ fn the_stages_one_by_one_make_the_model_of_one_go() {
     let fixture = fixture();
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("model.zarr");
-    succeed(btf().arg("tile").args([&fixture.measurement(), &model]));
+    succeed(btf().arg("tile").args([&fixture.measurement(), &model]).args(["--tile", "cut"]));
     succeed(btf().arg("normals").args([&fixture.measurement(), &model]));
     succeed(btf().arg("fit").arg(&model));
     succeed(btf().arg("cluster").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    succeed(btf().arg("appearance").arg(&model));
     let (mut one_by_one, mut one_go) = (tree(&model), tree(&fixture.model()));
     let attributes = |tree: &mut std::collections::BTreeMap<_, Vec<u8>>| -> serde_json::Value {
         serde_json::from_slice(&tree.remove(std::path::Path::new("zarr.json")).unwrap()).unwrap()
@@ -106,6 +114,8 @@ fn usage_errors_exit_with_2() {
             "paper",
             "--candidates",
             "0",
+            "--method",
+            "paper",
         ]),
         2,
     );
@@ -125,11 +135,17 @@ fn a_model_that_lost_an_array_is_mended_by_the_same_command() {
     let fixture = fixture();
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("model.zarr");
-    let run =
-        || succeed(btf().arg("model").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    let run = || succeed(&mut model_of(&fixture.measurement(), &model));
     run();
     let whole = tree(&model);
-    for lost in ["index/c/0/0", "mrf/level_0/gamma/c/0/0", "tile_source/zarr.json", "normals/c/0/0/0"] {
+    for lost in [
+        "index/c/0/0",
+        "mrf/level_0/gamma/c/0/0",
+        "tile_source/zarr.json",
+        "normals/c/0/0/0",
+        "appearance/features/zarr.json",
+        "appearance/level_1/basis/c/0/0",
+    ] {
         std::fs::remove_file(model.join(lost)).unwrap();
         run();
         assert_eq!(whole, tree(&model), "{lost}");

@@ -15,7 +15,7 @@ use crate::store::enlarged::{Description, Enlarged, SHARD_SIDE, Texels};
 const BLOCK_SHARDS: usize = 2;
 
 /// What is made at once.
-pub(super) const UNIT: &str = "block of shards";
+pub(super) const UNIT: &str = "blocks of shards";
 
 /// Memory of a texel of a block: its position at two levels, source, cluster, and what is packed.
 const TEXEL_BYTES: u64 = 24;

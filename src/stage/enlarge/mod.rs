@@ -8,6 +8,7 @@ pub mod paper;
 pub mod patches;
 mod pipeline;
 pub mod quilt;
+mod verdict;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -21,8 +22,9 @@ use crate::run::recipe::METHOD;
 use crate::shape::Size;
 use crate::stage::cluster;
 use crate::stage::import::Shard;
-use crate::store::enlarged::Method;
+use crate::store::enlarged::{Enlarged, Method};
 use crate::store::model::{Model, Stage, index_bytes};
+pub use verdict::Verdict;
 
 /// How to enlarge.
 #[derive(Clone, Debug)]
@@ -82,7 +84,7 @@ struct Units {
 trait Rule {
     /// Its name in recipes.
     fn method(&self) -> Method;
-    /// What a unit of an output is, and how many there are.
+    /// What the units of an output are, in the plural, and how many there are.
     fn units(&self, subject: &Subject) -> (&'static str, usize);
     /// What the bytes of an output depend on, beside the model, the size, the seed and whether it joins at its borders.
     fn recipe(&self) -> Map<String, Value>;
@@ -112,12 +114,14 @@ pub struct Report {
     pub stored_bytes: u64,
     /// Bytes of the enlarged BTF's raw samples.
     pub raw_bytes: u64,
-    /// What is done at once and either done or not.
+    /// What its units are, in the plural: each is done at once, and either done or not.
     pub unit: &'static str,
     /// Units found done.
     pub found: usize,
     /// Units written by this run.
     pub written: usize,
+    /// Whether it looks like its tile; absent while other runs have units to make.
+    pub verdict: Option<Verdict>,
 }
 
 /// Checks that the model is complete and can be enlarged to this size.
@@ -209,15 +213,20 @@ impl Plan {
         let units = self.rule.make(&self.subject, &self.outputs, context)?;
         let clusters = &self.subject.clusters;
         let texel_bytes = clusters.tile_bytes / self.subject.tile.texels() as u64;
-        let report = |(output, units): (&Output, Units)| Report {
-            output: output.path.clone(),
-            seed: output.seed,
-            stored_bytes: self.subject.index_bytes() + clusters.representative_bytes,
-            raw_bytes: texel_bytes * self.subject.options.size.texels() as u64,
-            unit: self.rule.units(&self.subject).0,
-            found: units.found,
-            written: units.written,
+        let report = |(output, units): (&Output, Units)| {
+            let enlarged = Enlarged::open(&output.path)?;
+            let (subject, method) = (&self.subject, self.rule.method());
+            Ok(Report {
+                output: output.path.clone(),
+                seed: output.seed,
+                stored_bytes: self.subject.index_bytes() + clusters.representative_bytes,
+                raw_bytes: texel_bytes * self.subject.options.size.texels() as u64,
+                unit: self.rule.units(&self.subject).0,
+                found: units.found,
+                written: units.written,
+                verdict: context.install(|| subject.verdict(&enlarged, method))?,
+            })
         };
-        Ok(self.outputs.iter().zip(units).map(report).collect())
+        self.outputs.iter().zip(units).map(report).collect()
     }
 }

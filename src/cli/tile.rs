@@ -1,0 +1,113 @@
+use std::path::{Path, PathBuf};
+
+use btfkit::error::Result;
+use btfkit::lattice::{LatticeChoice, WaveCounts};
+use btfkit::run::Context;
+use btfkit::stage::tile;
+use clap::Args;
+
+use super::Tell;
+
+/// Of a plane of which the tile is less than this, more is worth having.
+const LITTLE: f64 = 0.5;
+
+#[derive(Args)]
+pub(super) struct TileOptions {
+    /// What to take as the tile: auto (plane up to 256 texels a side, else cut), plane (all), cut (a seamless part), none
+    /// (all, borders do not join), periodic (all, they do) or WIDTHxHEIGHT (a seamless part)
+    #[arg(long, default_value = "auto")]
+    tile: tile::Choice,
+    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
+    pub(super) lattice: LatticeChoice,
+}
+
+#[derive(Args)]
+pub(super) struct Seed {
+    /// Seed of all that is drawn at random
+    #[arg(long, default_value_t = 1)]
+    pub(super) seed: u64,
+}
+
+/// Take a tile from a measurement, whole or a part that joins at its borders; begins a model
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf tile wood.zarr wood.model.zarr --tile none
+  btf tile cloth.zarr cloth.model.zarr --tile cut --lattice '15.2,0;0,18.4'     whole cells of this weave")]
+pub(super) struct Tile {
+    /// The measurement
+    measurement: PathBuf,
+    /// The model to begin
+    model: PathBuf,
+    #[command(flatten)]
+    options: TileOptions,
+    #[command(flatten)]
+    seed: Seed,
+    /// Only say what would be done
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl Tile {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let plan = tile_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
+        if self.dry_run {
+            return tell.plan(&plan.summary());
+        }
+        tell_tile(&plan.run(context)?, tell);
+        Ok(())
+    }
+}
+
+pub(super) fn tile_plan(
+    measurement: &Path,
+    model: &Path,
+    options: &TileOptions,
+    seed: u64,
+) -> Result<tile::Plan> {
+    tile::plan(&tile::Options {
+        measurement: measurement.into(),
+        model: model.into(),
+        choice: options.tile,
+        lattice: options.lattice,
+        seed,
+    })
+}
+
+pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
+    let [height, width] = report.size;
+    let seams = match &report.patch {
+        Some(patch) => format!(
+            "from row {}, column {}; step across its seams {:.2} of an ordinary one (uncut {:.2})",
+            patch.y, patch.x, report.seam_visibility, report.uncut_visibility
+        ),
+        None if report.wraps => format!(
+            "the whole measurement; step across its borders {:.2} of an ordinary one",
+            report.seam_visibility
+        ),
+        None => "the whole measurement, its borders do not join".to_owned(),
+    };
+    tell.line(format!("tile      {width}x{height} {seams}"));
+    let lattice = &report.lattice;
+    let cells = WaveCounts(report.cells.clone()).cells();
+    match lattice.vectors().len() {
+        0 => {}
+        _ if cells == 0 => {
+            tell.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
+        }
+        1 => tell
+            .line(format!("          holds {cells} ribs, a period of {lattice:.1} texels (rows, columns)")),
+        _ => tell.line(format!(
+            "          holds {cells} cells of the lattice {lattice:.1} texels (rows, columns)"
+        )),
+    }
+    let [texels, all] = [report.size, report.measurement_size].map(|[height, width]| (height * width) as f64);
+    if texels < LITTLE * all {
+        tell.line(format!(
+            "          {:.0} % of what was measured: --tile none gives enlargements all of it to draw on, and the clustering {:.1} times the texels",
+            100.0 * texels / all,
+            all / texels
+        ));
+    }
+}

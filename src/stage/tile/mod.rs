@@ -1,0 +1,174 @@
+//! Measurement to tile: the whole plane, or a patch of it whose borders can be made to join.
+
+mod choice;
+mod features;
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+pub use choice::Choice;
+pub(crate) use features::features;
+
+use crate::color::Transfer;
+use crate::error::{Error, Result};
+use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
+use crate::run::Context;
+use crate::run::recipe::METHOD;
+use crate::shape::Size;
+use crate::store::measurement::Measurement;
+use crate::store::model::{Model, Stage};
+use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
+use features::lattice_of;
+
+/// How to cut a tile.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The measurement.
+    pub measurement: PathBuf,
+    /// The model to begin.
+    pub model: PathBuf,
+    /// What to take.
+    pub choice: Choice,
+    /// The lattice of a regular material, of which a tile is cut to whole cells.
+    pub lattice: LatticeChoice,
+    /// Seed of the search.
+    pub seed: u64,
+}
+
+/// How a tile was cut.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Report {
+    /// Rows and columns of the tile.
+    pub size: [usize; 2],
+    /// Whether its borders join.
+    pub wraps: bool,
+    /// Where it was cut; absent where the whole measurement is the tile.
+    pub patch: Option<Patch>,
+    /// Step across the seams relative to that between ordinary neighbours (1: cannot be told).
+    pub seam_visibility: f64,
+    /// The same for the patch repeated without cutting.
+    pub uncut_visibility: f64,
+    /// Transfer curve of the measurement's samples.
+    pub transfer: Transfer,
+    /// Rows and columns of the measurement.
+    pub measurement_size: [usize; 2],
+    /// The lattice that was found in the plane, or given.
+    #[serde(default)]
+    pub lattice: Lattice,
+    /// Cycles of each of its waves down and across the tile (of one whose borders do not join, its largest part of
+    /// whole cells); none where the tile holds no whole number of cells.
+    #[serde(default)]
+    pub cells: Vec<[i32; 2]>,
+}
+
+/// A cut, ready to be made.
+pub struct Plan {
+    measurement: Measurement,
+    model: PathBuf,
+    /// Never `Auto`.
+    choice: Choice,
+    lattice: LatticeChoice,
+    seed: u64,
+    recipe: Value,
+}
+
+/// Checks that the measurement can give such a tile.
+pub fn plan(options: &Options) -> Result<Plan> {
+    let measurement = Measurement::open(&options.measurement)?;
+    let plane = measurement.description().size;
+    let choice = options.choice.resolved(plane);
+    range(choice, plane, &Lattice::None)?;
+    let mut recipe = json!({
+        "stage": "tile", "method": METHOD,
+        "measurement": measurement.digest(),
+        "tile": choice.to_string(),
+        "seed": options.seed,
+    });
+    // Of other tiles only the report tells the lattice.
+    if choice == Choice::Cut || options.lattice != LatticeChoice::Auto {
+        recipe["lattice"] = options.lattice.to_string().into();
+    }
+    Ok(Plan {
+        measurement,
+        model: options.model.clone(),
+        choice,
+        lattice: options.lattice,
+        seed: options.seed,
+        recipe,
+    })
+}
+
+/// What to search for a tile; `None` where the whole plane is it.
+fn range(choice: Choice, plane: Size, lattice: &Lattice) -> Result<Option<SearchRange>> {
+    match choice {
+        Choice::Plane | Choice::None | Choice::Periodic => Ok(None),
+        Choice::Sized(size) => SearchRange::of_size(size, plane).map(Some).map_err(|overlap| {
+            Error::usage(format!(
+                "a tile of {size} needs {overlap} more rows and columns to cut its seams in and at least 8 a side, the measurement has {plane}"
+            ))
+        }),
+        Choice::Auto | Choice::Cut => SearchRange::for_plane(plane, lattice).map(Some).ok_or_else(|| {
+            Error::usage(format!("a measurement of {plane} is too small to cut a seamless tile from"))
+                .hint("use --tile plane, which takes all of it")
+        }),
+    }
+}
+
+impl Plan {
+    /// What would be done.
+    pub fn summary(&self) -> Value {
+        json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
+    }
+
+    /// Cuts the tile, unless that is done.
+    pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let model = Model::create(&self.model)?;
+        let Some(_lock) = model.begin(Stage::Tile, &self.recipe)? else {
+            return model.report(Stage::Tile);
+        };
+        let description = self.measurement.description();
+        let plane = description.size;
+        let features = features(&self.measurement, context)?;
+        let (tile, patch, lattice) = context.install(|| self.tile(&features))?;
+        let report = Report {
+            size: [tile.size.height, tile.size.width],
+            wraps: tile.wraps,
+            patch,
+            seam_visibility: if tile.wraps { seam_visibility(&features, &tile) } else { 1.0 },
+            uncut_visibility: patch.map_or(1.0, |patch| seam_visibility(&features, &patch.uncut())),
+            transfer: description.transfer,
+            measurement_size: [plane.height, plane.width],
+            lattice,
+            cells: cells(&lattice, &tile),
+        };
+        model.write_directions(description)?;
+        model.write_tile(&tile)?;
+        model.finish(Stage::Tile, &self.recipe, &report)?;
+        Ok(report)
+    }
+
+    /// The tile, where it was cut, and the lattice of the plane.
+    fn tile(&self, features: &Features) -> Result<(Tile, Option<Patch>, Lattice)> {
+        let wraps = match self.choice {
+            Choice::Plane => borders_join(features),
+            choice => choice == Choice::Periodic,
+        };
+        let lattice = match self.lattice {
+            LatticeChoice::Auto => lattice_of(features, wraps)?,
+            LatticeChoice::Given(lattice) => lattice,
+        };
+        let Some(range) = range(self.choice, features.size, &lattice)? else {
+            return Ok((Tile::whole(features.size, wraps), None, lattice));
+        };
+        let cut = cut(features, search(features, &range, self.seed));
+        Ok((cut.tile, Some(cut.patch), lattice))
+    }
+}
+
+/// Cycles of the waves of a lattice down and across a tile, as the report has them.
+fn cells(lattice: &Lattice, tile: &Tile) -> Vec<[i32; 2]> {
+    let part = if tile.wraps { Some(tile.size.window()) } else { largest_whole_cells(lattice, tile.size) };
+    part.and_then(|part| wave_counts(lattice, part.size)).map_or_else(Vec::new, |WaveCounts(counts)| counts)
+}

@@ -64,6 +64,7 @@ fn the_stages_one_by_one_make_the_model_of_one_go() {
     succeed(btf().arg("normals").args([&fixture.measurement(), &model]));
     succeed(btf().arg("fit").arg(&model));
     succeed(btf().arg("cluster").args([&fixture.measurement(), &model]).args(["--clusters", "24"]));
+    succeed(btf().arg("appearance").arg(&model));
     let (mut one_by_one, mut one_go) = (tree(&model), tree(&fixture.model()));
     let attributes = |tree: &mut std::collections::BTreeMap<_, Vec<u8>>| -> serde_json::Value {
         serde_json::from_slice(&tree.remove(std::path::Path::new("zarr.json")).unwrap()).unwrap()

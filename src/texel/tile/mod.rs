@@ -152,11 +152,7 @@ fn vertical_path(features: &Features, patch: Patch) -> (Vec<usize>, u64) {
 }
 
 /// Cost of cutting between places p and p + 1: how far the two sides differ at both.
-pub(in crate::texel) fn path_cost(
-    length: usize,
-    overlap: usize,
-    difference: impl Fn(usize, usize) -> u64,
-) -> Vec<u64> {
+pub(crate) fn path_cost(length: usize, overlap: usize, difference: impl Fn(usize, usize) -> u64) -> Vec<u64> {
     let mut cost = Vec::with_capacity(length * (overlap - 1));
     for step in 0..length {
         let mut before = difference(step, 0);

@@ -8,9 +8,11 @@
 //! ```
 //!
 //! [`stage`] holds one module a step, [`store`] what lies on disk, [`run`] what makes long work
-//! survive, [`texel`], [`mrf`] and [`color`] the science, [`kernel`] the hot loops.
+//! survive, [`texel`], [`mrf`], [`likeness`] and [`color`] the science, [`baseline`] what it is
+//! measured by, [`kernel`] the hot loops.
 
 pub mod archive;
+pub mod baseline;
 pub mod coherent;
 pub mod color;
 pub mod demo;
@@ -19,6 +21,7 @@ pub mod factor;
 pub mod hdf5;
 pub mod kernel;
 pub mod lattice;
+pub mod likeness;
 pub mod mrf;
 pub mod picture;
 pub mod random;

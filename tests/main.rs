@@ -5,16 +5,26 @@
 mod archives;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
+#[path = "behaviour/baselines.rs"]
+mod baselines;
 #[path = "behaviour/check.rs"]
 mod check;
 #[path = "behaviour/clusters.rs"]
 mod clusters;
+#[path = "behaviour/coherent.rs"]
+mod coherent;
+#[path = "behaviour/coherent_damage.rs"]
+mod coherent_damage;
+#[path = "behaviour/coherent_example.rs"]
+mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]
 mod determinism;
+#[path = "behaviour/document_pictures.rs"]
+mod document_pictures;
 #[path = "behaviour/equations.rs"]
 mod equations;
 #[path = "behaviour/fixture.rs"]
@@ -24,8 +34,12 @@ mod fixture;
 mod hdf5;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
+#[path = "behaviour/judging.rs"]
+mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/paper_bytes.rs"]
+mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]

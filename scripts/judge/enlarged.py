@@ -1,7 +1,8 @@
-"""The enlarged index: every choice the minimiser of (25) among the clusters of the nearest normals."""
+"""The enlarged index: of the paper's method, every choice the minimiser of (25) among the clusters of the nearest normals."""
 
 import numpy as np
 
+from judge.continued import continued
 from judge.normals import unit_length
 
 PIXELS = 200
@@ -47,6 +48,9 @@ def enlarged(report, store, modelled):
     index = store.read("index")
     clusters = modelled.array("distance").shape[0]
     report.none("enlarged index below the number of clusters", index >= clusters)
+    if store.attributes["recipe"].get("rule") == "coherent":
+        continued(report, store, modelled)
+        return
     if "normals" not in store.group:
         report.note("(25) is not judged: the enlarged normals were not kept")
         return

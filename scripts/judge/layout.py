@@ -86,12 +86,28 @@ def model(report, store, measured):
         **direction_arrays(views, lights),
         **field_arrays(stages["fit"]["report"]),
     })
+    appearance(report, store)
     names = {name for name, _ in store.group["mrf"].groups()}
     report.equal("levels on disk", sorted(names), [f"level_{k}" for k in range(len(stages["fit"]["report"]["levels"]))])
     for name in ("view", "light"):
         known = store.read(f"{name}_direction")
         report.check(f"{name}s are the measurement's", np.array_equal(known, measured.read(f"{name}_direction")),
                      len(known))
+
+
+def appearance(report, store):
+    """The arrays under `appearance/`, and what the report says of levels."""
+    stage = store.attributes["stages"]["appearance"]["report"]
+    clusters, levels = store.array("distance").shape[0], stage["levels"]
+    _, _, height, width = stage["exemplar"]
+    report.equal("levels of the appearance", len(levels), max(1, min(height, width) // 4).bit_length())
+    expected = {"appearance/features": ((clusters, 8), "int8", "cluster feature")}
+    for k, level in enumerate(levels):
+        dims = 8 if k + 2 >= len(levels) else 4
+        report.equal(f"spacing and dimensions of level {k}", (level["spacing"], level["dims"]), (1 << k, dims))
+        expected[f"appearance/level_{k}/basis"] = ((72, dims), "int16", "input dim")
+        expected[f"appearance/level_{k}/offset"] = ((dims,), "int32", "dim")
+    arrays(report, store, expected)
 
 
 def field_arrays(fit):
@@ -120,10 +136,16 @@ def field_arrays(fit):
 def enlarged(report, store, modelled):
     attributes(report, store)
     recipe = store.attributes["recipe"]
-    absent = [name for name in ("model", "size", "seed", "candidates") if recipe.get(name) is None]
+    coherent = recipe.get("rule") == "coherent"
+    settings = ("jitter", "source") if coherent else ("candidates",)
+    absent = [name for name in ("model", "size", "seed", "tileable", *settings) if recipe.get(name) is None]
     report.equal("absent from the recipe of the enlarged", absent, [])
     kept = "normals" in store.group
     report.equal("normals kept as asked", kept, recipe["keep_normals"])
     arrays(report, store, {"index": (recipe["size"], modelled.array("index").dtype.name, "y x")})
     if kept:
         arrays(report, store, {"normals": ((*recipe["size"], 3), "float32", "y x xyz")})
+    if coherent and recipe["source"]:
+        arrays(report, store, {"source": (recipe["size"], "uint32", "y x")})
+        tile = list(modelled.array("index").shape)
+        report.equal("tile that the source counts in", store.array("source").attrs["tile"], tile)

@@ -2,14 +2,21 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use btfkit::coherent::JITTER_ONE;
-use btfkit::error::Result;
+use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::shape::Size;
-use btfkit::stage::enlarge::{self, By, coherent, paper};
+use btfkit::stage::enlarge::patches::Pieces;
+use btfkit::stage::enlarge::{self, By, Verdict, coherent, paper, patches, quilt};
 use btfkit::stage::import::Shard;
 use clap::{Args, ValueEnum};
 
 use super::{Tell, bytes_text};
+
+/// Tiles of a set, unless their number is given.
+const TILES: usize = 4;
+
+/// Nearest normals among which the paper's method chooses, unless their number is given.
+const CANDIDATES: usize = 16;
 
 /// The most outputs that one command makes.
 const MOST_SEEDS: u64 = 1 << 16;
@@ -24,6 +31,8 @@ Examples:
   btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      joins at its own borders
   btf enlarge wood.model.zarr huge.zarr --size 65536x65536 --shard 3/8   one of eight jobs that share the work
   btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of Filip and Haindl 2007
+  btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    their second baseline
+  btf enlarge wood.model.zarr quilt.zarr --size 1024x1024 --method quilt image quilting
 The same model, method, size and seed give the same bytes, whatever the memory, the threads, the shards and the
 interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
@@ -41,26 +50,29 @@ pub(super) struct Enlarge {
     /// one output for each, the last included
     #[arg(long, default_value = "1", value_parser = seeds)]
     seed: RangeInclusive<u64>,
-    /// Make an output that joins at its own borders. Its sides must be multiples of a power of two, which an error
-    /// names if they are not
+    /// Make an output that joins at its own borders. Its sides must be multiples of what an error names if they are
+    /// not: a power of two (coherent, paper), the tile's sides (repeat, tiles), or a part of them (roller, quilt)
     #[arg(long)]
     tileable: bool,
-    /// Make only part K of N of the output (coherent): N jobs share the work, in any order
+    /// Make only part K of N of the output (not paper, not quilt): N jobs share the work, in any order
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// How far pieces of the exemplar are moved against each other, from 0 to 1 (coherent): more repeats less, less fits
     /// better [default: 0.5, and 0 where the material has a lattice]
     #[arg(long, value_parser = jitter)]
     jitter: Option<f64>,
-    /// Do not write which texel of the tile each texel is (coherent)
+    /// Do not write which texel of the tile each texel is (all but paper)
     #[arg(long)]
     no_source: bool,
-    /// Write normals beside the index: the tile's (coherent), or the synthesised ones (paper)
+    /// Write normals beside the index: the tile's, or the synthesised ones (paper)
     #[arg(long)]
     keep_normals: bool,
-    /// Number of nearest normals among which one is chosen (paper)
-    #[arg(long, default_value_t = 16)]
-    candidates: usize,
+    /// Number of tiles that join each other (tiles) [default: 4]
+    #[arg(long, value_name = "N")]
+    tiles: Option<usize>,
+    /// Number of nearest normals among which one is chosen (paper) [default: 16]
+    #[arg(long)]
+    candidates: Option<usize>,
     /// Rows in work at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     band: Option<u32>,
@@ -69,16 +81,25 @@ pub(super) struct Enlarge {
     dry_run: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
     /// Pieces of the exemplar that continue each other: keeps structure
     Coherent,
     /// Nearest normals of a random field: Filip and Haindl 2007
     Paper,
+    /// The tile again and again, whatever the seed
+    Repeat,
+    /// Some tiles of one border and different insides, laid at random: all join each other
+    Tiles,
+    /// Patches from random places of the tile on a grid, stitched along minimum-error paths
+    Roller,
+    /// Blocks chosen to fit those before, stitched along minimum-error paths: Efros and Freeman 2001
+    Quilt,
 }
 
 impl Enlarge {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        self.refuse_options_of_others()?;
         let plan = enlarge::plan(&enlarge::Options {
             model: self.model.clone(),
             output: self.output.clone(),
@@ -93,7 +114,7 @@ impl Enlarge {
         }
         for report in plan.run(context)? {
             tell.line(format!(
-                "{}: {} from seed {}; {} {}s written, {} found done",
+                "{}: {} from seed {}; {} {} written, {} found done",
                 report.output.display(),
                 self.size,
                 report.seed,
@@ -107,24 +128,70 @@ impl Enlarge {
                 report.raw_bytes as f64 / report.stored_bytes as f64,
                 bytes_text(report.raw_bytes)
             ));
+            if let Some(verdict) = &report.verdict {
+                tell_verdict(verdict, tell);
+            }
         }
         Ok(())
     }
 
+    /// Refuses options that the method does not take.
+    fn refuse_options_of_others(&self) -> Result<()> {
+        use Method::{Coherent, Paper, Quilt, Repeat, Roller, Tiles};
+        let options: [(bool, &str, &[Method]); 5] = [
+            (self.jitter.is_some(), "--jitter", &[Coherent]),
+            (self.no_source, "--no-source", &[Coherent, Repeat, Tiles, Roller, Quilt]),
+            (self.tiles.is_some(), "--tiles", &[Tiles]),
+            (self.candidates.is_some(), "--candidates", &[Paper]),
+            (self.band.is_some(), "--band", &[Paper]),
+        ];
+        let name = |method: &Method| format!("{method:?}").to_lowercase();
+        match options.iter().find(|(given, _, methods)| *given && !methods.contains(&self.method)) {
+            None => Ok(()),
+            Some((_, option, methods)) => {
+                let takers: Vec<String> = methods.iter().map(name).collect();
+                let method = name(&self.method);
+                Err(Error::usage(format!("got {option}, which --method {method} does not take"))
+                    .hint(format!("leave it out, or choose --method {}", takers.join(" or "))))
+            }
+        }
+    }
+
     fn by(&self) -> By {
-        let keep_normals = self.keep_normals;
+        let (keep_source, keep_normals) = (!self.no_source, self.keep_normals);
+        let pieces = |pieces| By::Patches(patches::Options { pieces, keep_source, keep_normals });
         match self.method {
             Method::Paper => By::Paper(paper::Options {
-                candidates: self.candidates,
+                candidates: self.candidates.unwrap_or(CANDIDATES),
                 keep_normals,
                 band_rows: self.band.map(|rows| rows as usize),
             }),
             Method::Coherent => By::Coherent(coherent::Options {
                 jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
-                keep_source: !self.no_source,
+                keep_source,
                 keep_normals,
             }),
+            Method::Repeat => pieces(Pieces::Repeat),
+            Method::Tiles => pieces(Pieces::Tiles(self.tiles.unwrap_or(TILES))),
+            Method::Roller => pieces(Pieces::Roller),
+            Method::Quilt => By::Quilt(quilt::Options { keep_source, keep_normals }),
         }
+    }
+}
+
+/// One line on whether an enlargement looks like its tile, and one for each warning.
+fn tell_verdict(verdict: &Verdict, tell: Tell) {
+    let copy = match verdict.largest_copy {
+        Some(copy) => format!(", largest unbroken copy {:.1} % of the middle", 100.0 * copy),
+        None => String::new(),
+    };
+    tell.line(format!(
+        "likeness  {:.0} % of the clusters' shares as in the tile, repetition {:+.2}{copy}",
+        100.0 * verdict.shares,
+        verdict.excess_peak
+    ));
+    for warning in &verdict.warnings {
+        tell.line(format!("warning   {warning}"));
     }
 }
 

@@ -12,6 +12,7 @@ mod fit;
 mod image;
 mod import;
 mod info;
+mod judge;
 mod progress;
 mod sample;
 mod scene;
@@ -97,6 +98,7 @@ enum Command {
     Compare(analyse::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Judge(judge::Judge),
 }
 
 /// Runs the program.
@@ -153,6 +155,7 @@ impl Command {
             Self::Compare(command) => command.run(context, tell),
             Self::Enlarge(command) => command.run(context, tell),
             Self::Image(command) => command.run(context, tell),
+            Self::Judge(command) => command.run(context, tell),
         }
     }
 }

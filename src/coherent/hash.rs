@@ -18,7 +18,19 @@ pub fn key(seed: u32, level: u32) -> u32 {
 /// Two numbers of 16 bits for a place of a level: the first moves rows, the second columns.
 #[inline]
 pub fn place(key: u32, y: i32, x: i32) -> [i32; 2] {
-    let word = mix(mix(key ^ x as u32) ^ (y as u32).wrapping_mul(0x9E37_79B1));
+    in_column(column(key, x), y)
+}
+
+/// What the places of a column have in common.
+#[inline]
+pub(super) fn column(key: u32, x: i32) -> u32 {
+    mix(key ^ x as u32)
+}
+
+/// [`place`] of a row of a column.
+#[inline]
+pub(super) fn in_column(column: u32, y: i32) -> [i32; 2] {
+    let word = mix(column ^ (y as u32).wrapping_mul(0x9E37_79B1));
     [(word >> 16) as i32, (word & 0xFFFF) as i32]
 }
 

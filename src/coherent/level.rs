@@ -2,11 +2,10 @@
 
 use rayon::prelude::*;
 
-use crate::coherent::appearance::{Basis, FEATURES, INPUTS};
+use crate::coherent::appearance::{Basis, COARSE_DIMS, FEATURES, FINE_DIMS, INPUTS};
+use crate::kernel::Kernel;
+use crate::kernel::project::{Projection, project_coarse, project_fine};
 use crate::shape::Size;
-
-/// Largest absolute value of an appearance: squared differences of threefold ones then stay below 2^24 in sum.
-const MOST: i32 = 120;
 
 /// Features of the texels, blurred as the levels become coarser.
 pub(super) struct Features {
@@ -75,14 +74,33 @@ pub(super) struct Level<const D: usize> {
     pub(super) values: Vec<[i8; D]>,
 }
 
+/// The kernel that reduces the surroundings of texels.
+type Project<const D: usize> = fn(Kernel, &[[i16; INPUTS]], &Projection<INPUTS, D>, &mut [[i8; D]]);
+
+impl Level<FINE_DIMS> {
+    pub(super) fn fine(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel) -> Self {
+        Self::new(features, basis, spacing, kernel, project_fine)
+    }
+}
+
+impl Level<COARSE_DIMS> {
+    pub(super) fn coarse(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel) -> Self {
+        Self::new(features, basis, spacing, kernel, project_coarse)
+    }
+}
+
 impl<const D: usize> Level<D> {
-    pub(super) fn new(features: &Features, basis: &Basis, spacing: usize) -> Self {
+    fn new(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel, project: Project<D>) -> Self {
+        let projection = Projection {
+            weights: std::array::from_fn(|d| std::array::from_fn(|n| basis.weights[n * D + d])),
+            offset: std::array::from_fn(|d| basis.offset[d]),
+            shift: basis.shift,
+        };
         let Size { height, width } = features.size();
         let mut plain = vec![[0i8; D]; height * width];
         plain.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            for (x, out) in row.iter_mut().enumerate() {
-                *out = project(&features.surroundings(spacing, y, x), basis);
-            }
+            let inputs: Vec<_> = (0..width).map(|x| features.surroundings(spacing, y, x)).collect();
+            project(kernel, &inputs, &projection, row);
         });
         let stride = width + 2 * spacing;
         let wrapped = |place: usize, side: usize| (place + side - spacing % side) % side;
@@ -95,19 +113,4 @@ impl<const D: usize> Level<D> {
         });
         Self { spacing, stride, values }
     }
-}
-
-/// Reduces surroundings by a basis. Sums wrap, so that no basis can break them; a fitted one never makes them wrap.
-#[inline]
-fn project<const D: usize>(inputs: &[i16; INPUTS], basis: &Basis) -> [i8; D] {
-    let mut sums = [0i32; D];
-    for (&input, weights) in inputs.iter().zip(basis.weights.chunks_exact(D)) {
-        for (sum, &weight) in sums.iter_mut().zip(weights) {
-            *sum = sum.wrapping_add(i32::from(input) * i32::from(weight));
-        }
-    }
-    std::array::from_fn(|n| {
-        let sum = sums[n].wrapping_sub(basis.offset[n]).wrapping_add(1 << (basis.shift - 1));
-        (sum >> basis.shift).clamp(-MOST, MOST) as i8
-    })
 }

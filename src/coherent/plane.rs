@@ -1,6 +1,8 @@
 //! The endless plane: any window of it, alone.
 
-use crate::coherent::appearance::{Appearance, JITTER_ONE, dims_of};
+use std::ops::Range;
+
+use crate::coherent::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, dims_of};
 use crate::coherent::level::{Features, Level};
 use crate::coherent::start::Start;
 use crate::error::{Error, Result};
@@ -16,6 +18,9 @@ const PARITIES: [[i64; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
 const REACH: [usize; 2] = [4, 6];
 /// And those that the first reaches besides.
 const REACH_BEYOND: [usize; 2] = [2, 0];
+
+/// What each pass reaches beyond a side of the exemplar where repetition costs.
+const REACH_REPEATING: usize = 6;
 
 /// Jitter where there is no lattice: half a spacing.
 const JITTER: u32 = JITTER_ONE / 2;
@@ -55,8 +60,8 @@ struct Correction {
 }
 
 enum Levelled {
-    Fine(Level<4>),
-    Coarse(Level<8>),
+    Fine(Level<FINE_DIMS>),
+    Coarse(Level<COARSE_DIMS>),
 }
 
 /// A part of a level: place of its first texel, rows and columns.
@@ -64,10 +69,20 @@ enum Levelled {
 pub(super) struct Region {
     y: i64,
     x: i64,
-    size: Size,
+    pub(super) size: Size,
 }
 
 impl Region {
+    /// Places of its rows.
+    pub(super) fn rows(&self) -> Range<i64> {
+        self.y..self.y + self.size.height as i64
+    }
+
+    /// Places of its columns.
+    pub(super) fn columns(&self) -> Range<i64> {
+        self.x..self.x + self.size.width as i64
+    }
+
     fn grown(self, [rows, columns]: [usize; 2]) -> Self {
         Self {
             y: self.y - rows as i64,
@@ -90,8 +105,8 @@ impl Region {
     /// A value for each place, row by row.
     pub(super) fn map<T>(&self, value: impl Fn([i64; 2]) -> T) -> Vec<T> {
         let mut values = Vec::with_capacity(self.size.texels());
-        for y in self.y..self.y + self.size.height as i64 {
-            values.extend((self.x..self.x + self.size.width as i64).map(|x| value([y, x])));
+        for y in self.rows() {
+            values.extend(self.columns().map(|x| value([y, x])));
         }
         values
     }
@@ -127,8 +142,8 @@ impl Plane {
         for (number, basis) in appearance.levels.iter().enumerate() {
             let spacing = 1 << number;
             let level = match dims_of(number, count) {
-                4 => Levelled::Fine(Level::new(&features, basis, spacing)),
-                _ => Levelled::Coarse(Level::new(&features, basis, spacing)),
+                FINE_DIMS => Levelled::Fine(Level::fine(&features, basis, spacing, kernel)),
+                _ => Levelled::Coarse(Level::coarse(&features, basis, spacing, kernel)),
             };
             levels.push(Correction { level, passes: basis.passes, repetition: basis.repetition });
             if number + 1 < count {
@@ -191,7 +206,12 @@ impl Plane {
             self.correct(level, region, &mut positions);
         }
         let Some(finest) = regions.first() else { return Ok(Vec::new()) };
-        Ok(window.map(|place| self.source(positions[finest.at(place)])))
+        let mut source = Vec::with_capacity(size.texels());
+        for y in window.rows() {
+            let row = &positions[finest.at([y, window.x])..][..size.width];
+            source.extend(row.iter().map(|&position| self.source(position)));
+        }
+        Ok(source)
     }
 
     /// Bytes that the levels take in memory.
@@ -229,8 +249,8 @@ impl Plane {
 
     /// The tile's texel at a position of the exemplar.
     fn source(&self, position: u32) -> u32 {
-        let [y, x] = unpack(position).map(|place| place as usize);
-        ((self.exemplar.y + y) * self.tile_width + self.exemplar.x + x) as u32
+        let [y, x] = unpack(position).map(|place| place as u32);
+        (self.exemplar.y as u32 + y) * self.tile_width as u32 + self.exemplar.x as u32 + x
     }
 
     /// Sides of the exemplar in texels of a level.
@@ -239,17 +259,18 @@ impl Plane {
         [height, width].map(|side| (side + (1 << level) / 2) >> level)
     }
 
+    /// Rows and columns that a pass reaches, and those that the first reaches besides.
+    fn reach(&self, level: usize) -> [[usize; 2]; 2] {
+        match self.levels[level].repetition {
+            0 => [REACH, REACH_BEYOND],
+            _ => [self.sides_at(level).map(|side| side + REACH_REPEATING), [0, 0]],
+        }
+    }
+
     /// Rows and columns around a region that its correction depends on.
     fn halo(&self, level: usize) -> [usize; 2] {
-        let Correction { passes, repetition, .. } = self.levels[level];
-        let sides = self.sides_at(level);
-        std::array::from_fn(|axis| {
-            if repetition > 0 {
-                passes * (sides[axis] + 6)
-            } else {
-                passes * REACH[axis] + REACH_BEYOND[axis]
-            }
-        })
+        let [reach, beyond] = self.reach(level);
+        std::array::from_fn(|axis| self.levels[level].passes * reach[axis] + beyond[axis])
     }
 
     /// Corrects the positions of a level; those in the halo come out as whatever they do.
@@ -258,8 +279,13 @@ impl Plane {
         let Correction { level: appearance, passes, repetition: cost } = &self.levels[level];
         let repeats = *cost > 0;
         let distance = self.sides_at(level);
-        let margin = if repeats { distance.map(|side| (side + 1).max(2)) } else { [2, 2] };
-        for _ in 0..*passes {
+        let [reach, _] = self.reach(level);
+        for pass in 0..*passes {
+            // Each pass leaves out what the passes to come do not reach, and what it cannot look around itself.
+            let margin: [usize; 2] = std::array::from_fn(|axis| {
+                let sites = if repeats { distance[axis] } else { 0 };
+                (pass * reach[axis] + sites).max(2)
+            });
             let before = if repeats { positions.to_vec() } else { Vec::new() };
             let repetition = repeats.then_some(Repetition { before: &before, distance, cost: *cost });
             for parity in PARITIES {

@@ -26,12 +26,10 @@ pub(super) struct Figures {
     pub(super) companion_visibility: f64,
     /// Row and column of the region in its interior.
     pub(super) companion_origin: [usize; 2],
-    /// Measured tile, tile by the model, enlarged picture; all under the light of the comparison.
-    pub(super) greys: [Grey; 3],
-    /// Sum over clusters of the lesser of their shares in the tile and in the enlarged index.
-    pub(super) histogram_overlap: f64,
-    /// Clusters of the model that the enlarged index does not use.
-    pub(super) unused_clusters: usize,
+    /// Measured tile and tile by the model, under the light of the comparison.
+    pub(super) greys: [Grey; 2],
+    pub(super) enlarged: Likeness,
+    pub(super) by_paper: Likeness,
     /// Root mean square angle of the synthesised normals from their mean, degrees.
     pub(super) synthesised_spread_deg: f64,
     pub(super) ledger: Ledger,
@@ -74,6 +72,27 @@ fn moments(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count).sqrt())
 }
 
+/// How near an enlargement comes to the tile.
+pub(super) struct Likeness {
+    /// Of the enlarged picture, under the light of the comparison.
+    pub(super) grey: Grey,
+    /// Sum over clusters of the lesser of their shares in the tile and in the enlarged index.
+    pub(super) histogram_overlap: f64,
+    /// Clusters of the model that the enlarged index does not use.
+    pub(super) unused_clusters: usize,
+}
+
+impl Likeness {
+    fn of(picture: &Picture, index: &[u16], in_tile: &[f64]) -> Self {
+        let in_enlarged = shares(index, in_tile.len());
+        Self {
+            grey: Grey::of(picture),
+            histogram_overlap: in_tile.iter().zip(&in_enlarged).map(|(a, b)| a.min(*b)).sum(),
+            unused_clusters: in_enlarged.iter().filter(|&&share| share == 0.0).count(),
+        }
+    }
+}
+
 /// What is counted against what, bytes.
 pub(super) struct Ledger {
     pub(super) representatives: u64,
@@ -100,13 +119,10 @@ impl Figures {
     ) -> Result<Self> {
         let model = &workshop.model;
         let cluster: cluster::Report = model.report(Stage::Cluster)?;
-        let reference = [Subject::Tile, Subject::Modelled, Subject::ENLARGED];
-        let mut greys = Vec::with_capacity(reference.len());
-        for subject in reference {
-            greys.push(Grey::of(&workshop.picture(subject, context)?));
-        }
-        let shares = [&workshop.tile_index, &workshop.enlarged_index].map(|i| shares(i, cluster.clusters));
-        let [in_tile, in_enlarged] = &shares;
+        let picture = |subject| workshop.picture(subject, context);
+        let in_tile = shares(&workshop.tile_index, cluster.clusters);
+        let enlarged = Likeness::of(&picture(Subject::ENLARGED)?, &workshop.enlarged_index, &in_tile);
+        let by_paper = Likeness::of(&picture(Subject::ByPaper)?, &workshop.index_by_paper, &in_tile);
         let texel = workshop.texel_bytes();
         let enlarged_texels = workshop.enlarged_index.len() as u64;
         let ledger = Ledger {
@@ -132,9 +148,9 @@ impl Figures {
             compare,
             companion_visibility: seam_visibility(&workshop.features, &workshop.companion.tile),
             companion_origin: workshop.companion.origin,
-            greys: [greys[0], greys[1], greys[2]],
-            histogram_overlap: in_tile.iter().zip(in_enlarged).map(|(a, b)| a.min(*b)).sum(),
-            unused_clusters: in_enlarged.iter().filter(|&&share| share == 0.0).count(),
+            greys: [Grey::of(&picture(Subject::Tile)?), Grey::of(&picture(Subject::Modelled)?)],
+            enlarged,
+            by_paper,
             synthesised_spread_deg: mean_and_spread(&workshop.synthesised_normals()?).1,
             ledger,
             cluster,

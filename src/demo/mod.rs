@@ -29,7 +29,7 @@ use crate::shape::Size;
 use crate::stage::cluster::Amount;
 use crate::stage::import::Shard;
 use crate::stage::tile::Choice;
-use crate::stage::{cluster, compare, enlarge, fit, import, normals, sample, tile};
+use crate::stage::{appearance, cluster, compare, enlarge, fit, import, normals, sample, tile};
 use crate::store::codec::Chain;
 use crate::store::enlarged::Enlarged;
 use crate::store::mapped::write_file;
@@ -99,6 +99,7 @@ mod names {
     pub(super) const MEASUREMENT: &str = "measurement.zarr";
     pub(super) const MODEL: &str = "material.model.zarr";
     pub(super) const ENLARGED: &str = "enlarged.zarr";
+    pub(super) const BY_PAPER: &str = "enlarged-by-paper.zarr";
     pub(super) const PICTURES: &str = "pictures";
     pub(super) const PAGE: &str = "index.html";
     pub(super) const RECORD: &str = "demo.json";
@@ -129,16 +130,28 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
         "seed": settings.seed,
     });
     let mut times = Times::open(place(names::RECORD), recipe)?;
-    let [archive, measurement, model, enlarged] =
-        [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED].map(place);
+    let [archive, measurement, model, enlarged, by_paper] =
+        [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED, names::BY_PAPER].map(place);
     measure(settings, &archive, &measurement, &mut times, context)?;
     analyse(settings, &measurement, &model, &mut times, context)?;
-    enlarge(settings, &model, &enlarged, &mut times, context)?;
+    let coherent = enlarge::coherent::Options { jitter: None, keep_source: true, keep_normals: false };
+    let paper =
+        enlarge::paper::Options { candidates: settings.candidates, keep_normals: true, band_rows: None };
+    for (step, output, by) in [
+        ("enlarge", &enlarged, enlarge::By::Coherent(coherent)),
+        ("enlarge by the paper's rule", &by_paper, enlarge::By::Paper(paper)),
+    ] {
+        let found = Enlarged::open(output).is_ok_and(|enlarged| enlarged.is_whole());
+        times.time(step, found, || {
+            let options = enlarge_options(settings, &model, output, by);
+            enlarge::plan(&options)?.run(context).map(|_| ())
+        })?;
+    }
 
     // These are made anew by every run: they read what the stages left and take a few seconds.
     let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
     let compared = times.time("compare", false, || compare::run(&compare, context))?;
-    let workshop = Workshop::open([&measurement, &model, &enlarged], settings.seed, context)?;
+    let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
     let figures = Figures::gather(&workshop, compared, places, context)?;
     let mut sections = story::sections(&figures, settings);
@@ -219,32 +232,24 @@ fn analyse(
     })?;
     times.time("fit", found(Stage::Fit), || {
         fit::plan(&fit::Options::of(model.clone()))?.run(context).map(|_| ())
+    })?;
+    times.time("appearance", found(Stage::Appearance), || {
+        let options = appearance::Options { model: model.clone(), lattice: LatticeChoice::Auto };
+        appearance::plan(&options)?.run(context).map(|_| ())
     })
 }
 
-/// Enlarges the model.
-fn enlarge(
-    settings: &Settings,
-    model: &Path,
-    output: &Path,
-    times: &mut Times,
-    context: &Context<'_>,
-) -> Result<()> {
-    let options = enlarge::Options {
+/// How the model is enlarged by one of the methods.
+fn enlarge_options(settings: &Settings, model: &Path, output: &Path, by: enlarge::By) -> enlarge::Options {
+    enlarge::Options {
         model: model.to_owned(),
         output: output.to_owned(),
         size: settings.enlarged,
         seeds: settings.seed..=settings.seed,
         tileable: false,
-        by: enlarge::By::Paper(enlarge::paper::Options {
-            candidates: settings.candidates,
-            keep_normals: true,
-            band_rows: None,
-        }),
+        by,
         shard: Shard::WHOLE,
-    };
-    let found = Enlarged::open(output).is_ok_and(|enlarged| enlarged.is_whole());
-    times.time("enlarge", found, || enlarge::plan(&options)?.run(context).map(|_| ()))
+    }
 }
 
 /// Makes the pictures of all sections, in their order.

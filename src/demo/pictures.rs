@@ -81,6 +81,8 @@ pub(super) enum Subject {
     TwoTiles,
     /// The enlarged index by the model.
     Enlarged(Lit),
+    /// The index enlarged by the paper's rule, by the model.
+    ByPaper,
 }
 
 impl Subject {
@@ -93,23 +95,25 @@ pub(super) struct Workshop {
     pub(super) measurement: Measurement,
     pub(super) model: Model,
     pub(super) enlarged: Enlarged,
+    pub(super) by_paper: Enlarged,
     pub(super) features: Features,
     pub(super) cut: Cut,
     pub(super) companion: Companion,
     pub(super) tile_index: Vec<u16>,
     pub(super) enlarged_index: Vec<u16>,
+    pub(super) index_by_paper: Vec<u16>,
     seed: u64,
 }
 
 impl Workshop {
     /// Opens the stores and cuts the second tile.
     pub(super) fn open(
-        [measurement, model, enlarged]: [&Path; 3],
+        [measurement, model, enlarged, by_paper]: [&Path; 4],
         seed: u64,
         context: &Context<'_>,
     ) -> Result<Self> {
         let (measurement, model) = (Measurement::open(measurement)?, Model::open(model)?);
-        let enlarged = Enlarged::open(enlarged)?;
+        let (enlarged, by_paper) = (Enlarged::open(enlarged)?, Enlarged::open(by_paper)?);
         let report: crate::stage::tile::Report = model.report(Stage::Tile)?;
         let patch = report
             .patch
@@ -122,7 +126,20 @@ impl Workshop {
         });
         let tile_index = model.index()?;
         let enlarged_index = enlarged.read(enlarged.size().window())?;
-        Ok(Self { measurement, model, enlarged, features, cut, companion, tile_index, enlarged_index, seed })
+        let index_by_paper = by_paper.read(by_paper.size().window())?;
+        Ok(Self {
+            measurement,
+            model,
+            enlarged,
+            by_paper,
+            features,
+            cut,
+            companion,
+            tile_index,
+            enlarged_index,
+            index_by_paper,
+            seed,
+        })
     }
 
     /// Raw bytes of a texel under all pairs of directions.
@@ -131,13 +148,13 @@ impl Workshop {
         description.bytes() / description.size.texels().max(1) as u64
     }
 
-    /// Synthesised normals of the whole enlarged index.
+    /// Synthesised normals of the whole plane.
     pub(super) fn synthesised_normals(&self) -> Result<Vec<[f32; 3]>> {
-        self.normals_of(self.enlarged.size().window())
+        self.normals_of(self.by_paper.size().window())
     }
 
     fn normals_of(&self, window: Window) -> Result<Vec<[f32; 3]>> {
-        let normals = self.enlarged.read_normals(window)?;
+        let normals = self.by_paper.read_normals(window)?;
         normals.ok_or_else(|| Error::internal("the enlarged index was made without its normals"))
     }
 
@@ -179,6 +196,7 @@ impl Workshop {
                 laid(&tiles, plane, |row, column| stands_at(self.seed, row, column))
             }
             Subject::Enlarged(lit) => self.modelled(plane, &self.enlarged_index, lit)?,
+            Subject::ByPaper => self.modelled(plane, &self.index_by_paper, Lit::REFERENCE)?,
         })
     }
 

@@ -8,6 +8,7 @@ pub mod collapse;
 pub mod counting;
 pub mod noise;
 pub mod predict;
+pub mod project;
 pub mod ranking;
 
 /// Instructions to use, chosen once.

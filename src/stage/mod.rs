@@ -11,6 +11,7 @@ pub mod export;
 pub mod fit;
 pub mod image;
 pub mod import;
+pub mod judge;
 pub mod normals;
 pub mod sample;
 pub mod tile;

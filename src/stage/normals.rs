@@ -75,8 +75,10 @@ impl Plan {
         let description = self.measurement.description();
         let view = frontal_view(&self.measurement);
         let tile = self.model.tile()?;
-        let stereo = Stereo::new(&description.lights)?;
-        let plane = self.normals_of_window(&stereo, view, tile.bounds(), context)?;
+        let bounds = tile.bounds();
+        context.progress.begin("normals", bounds.size.height as u64, Counted::Items("rows"));
+        let plane = of_window(&self.measurement, view, self.robust, bounds, context)?;
+        context.progress.end();
         let normals: Vec<[f32; 3]> = tile.offsets_in_bounds().into_iter().map(|at| plane[at]).collect();
         self.model.write_normals(tile.size, &normals)?;
         let (mean, spread_deg) = mean_and_spread(&normals);
@@ -84,39 +86,39 @@ impl Plan {
         self.model.finish(Stage::Normals, &self.recipe, &report)?;
         Ok(report)
     }
+}
 
-    /// Normals of a window of the measurement, band by band.
-    fn normals_of_window(
-        &self,
-        stereo: &Stereo,
-        view: usize,
-        window: Window,
-        context: &Context<'_>,
-    ) -> Result<Vec<[f32; 3]>> {
-        let description = self.measurement.description();
-        let (texel, channels) = (description.texel_samples(), description.n_channels());
-        let decoder = description.decoder()?;
-        let normal = |samples: &Samples, at: usize| {
-            let intensities: Vec<f64> =
-                (at..at + texel).step_by(channels).map(|sample| decoder.luminance(samples, sample)).collect();
-            if self.robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
-        };
-        let mut normals = Vec::with_capacity(window.size.texels());
-        context.progress.begin("normals", window.size.height as u64, Counted::Items("rows"));
-        for top in (0..window.size.height).step_by(BAND_ROWS) {
-            context.check_stop()?;
-            let rows = BAND_ROWS.min(window.size.height - top);
-            let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
-            let samples = self.measurement.read_reflectance(view, band)?;
-            let texels = 0..samples.len() / texel;
-            let band: Vec<[f32; 3]> =
-                context.install(|| texels.into_par_iter().map(|t| normal(&samples, t * texel)).collect());
-            normals.extend(band);
-            context.progress.advance(rows as u64);
-        }
-        context.progress.end();
-        Ok(normals)
+/// Normals of a window of a measurement under the lights of one view, band by band; `robust` leaves out the lights that
+/// fit worst.
+pub(crate) fn of_window(
+    measurement: &Measurement,
+    view: usize,
+    robust: bool,
+    window: Window,
+    context: &Context<'_>,
+) -> Result<Vec<[f32; 3]>> {
+    let description = measurement.description();
+    let stereo = Stereo::new(&description.lights)?;
+    let (texel, channels) = (description.texel_samples(), description.n_channels());
+    let decoder = description.decoder()?;
+    let normal = |samples: &Samples, at: usize| {
+        let intensities: Vec<f64> =
+            (at..at + texel).step_by(channels).map(|sample| decoder.luminance(samples, sample)).collect();
+        if robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
+    };
+    let mut normals = Vec::with_capacity(window.size.texels());
+    for top in (0..window.size.height).step_by(BAND_ROWS) {
+        context.check_stop()?;
+        let rows = BAND_ROWS.min(window.size.height - top);
+        let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
+        let samples = measurement.read_reflectance(view, band)?;
+        let texels = 0..samples.len() / texel;
+        let band: Vec<[f32; 3]> =
+            context.install(|| texels.into_par_iter().map(|t| normal(&samples, t * texel)).collect());
+        normals.extend(band);
+        context.progress.advance(rows as u64);
     }
+    Ok(normals)
 }
 
 /// The view nearest to the surface normal, the first of equals.

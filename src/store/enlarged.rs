@@ -21,6 +21,9 @@ pub const SHARD_SIDE: usize = 512;
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
 
+/// Longest side of an index, as of every [`Size`] that is given as text.
+const MOST_SIDE: u64 = 1 << 24;
+
 /// How an index was enlarged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -30,6 +33,14 @@ pub enum Method {
     Paper,
     /// Source positions that continue their neighbours, from coarse to fine.
     Coherent,
+    /// The tile again and again.
+    Repeat,
+    /// Tiles of one border, laid at random.
+    Tiles,
+    /// Patches of the tile at random places, stitched on a grid.
+    Roller,
+    /// Image quilting.
+    Quilt,
 }
 
 impl Method {
@@ -38,6 +49,7 @@ impl Method {
         match self {
             Self::Paper => &[Stage::Cluster, Stage::Fit],
             Self::Coherent => &[Stage::Cluster, Stage::Appearance],
+            Self::Repeat | Self::Tiles | Self::Roller | Self::Quilt => &[Stage::Cluster],
         }
     }
 }
@@ -107,9 +119,11 @@ impl Enlarged {
         let store = Store::at(path);
         let attributes = store.expect(KIND)?;
         let index = store.open_array("index")?;
-        let &[height, width] = index.shape() else {
+        let (&[height, width], true) =
+            (index.shape(), index.shape().iter().all(|n| (1..=MOST_SIDE).contains(n)))
+        else {
             return Err(Error::input(format!(
-                "{}: index: got shape {:?}, expected [y, x]",
+                "{}: index: got shape {:?}, expected [y, x], each from 1 to {MOST_SIDE}",
                 path.display(),
                 index.shape()
             )));

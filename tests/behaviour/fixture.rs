@@ -59,11 +59,17 @@ pub fn btf() -> Command {
     command
 }
 
-/// The enlargement that made the fixture's, of a model to a place.
+/// The enlargement by the paper's method that made the fixture's, of a model to a place.
 pub fn enlarge(model: &Path, output: &Path) -> Command {
     let mut command = btf();
     let size = format!("{}x{}", ENLARGED[1], ENLARGED[0]);
-    command.arg("enlarge").args([model, output]).args(["--size", &size, "--keep-normals"]);
+    command.arg("enlarge").args([model, output]).args([
+        "--method",
+        "paper",
+        "--size",
+        &size,
+        "--keep-normals",
+    ]);
     command
 }
 

@@ -56,7 +56,11 @@ fn an_enlargement_killed_half_way_goes_on_to_the_same_bytes() {
 fn killed_with_a_state(output: &Path, more: &[&str]) -> Command {
     let run = || {
         let mut command = btf();
-        command.arg("enlarge").args([&fixture().model(), output]).args(["--size", "520x3000"]).args(more);
+        command
+            .arg("enlarge")
+            .args([&fixture().model(), output])
+            .args(["--method", "paper", "--size", "520x3000"])
+            .args(more);
         command
     };
     let code = interrupt(&mut run(), "-KILL", || output.join("enlarge-state").exists());
@@ -72,7 +76,7 @@ fn a_killed_enlargement_goes_on_after_its_last_row_of_shards() {
         let mut command = killed_with_a_state(&output, more);
         let told = succeed(&mut command);
         assert!(!told.contains(" 0 found done"), "{told}");
-        let whole = ["--size", "520x3000"];
+        let whole = ["--method", "paper", "--size", "520x3000"];
         succeed(btf().arg("enlarge").args([&fixture().model(), &undisturbed]).args(whole).args(more));
         assert_same(&output, &undisturbed);
         for store in [output, undisturbed] {
@@ -107,7 +111,10 @@ fn the_first_term_signal_stops_with_75_and_the_same_command_goes_on() {
     let (output, undisturbed) = (folder.path().join("stopped"), folder.path().join("undisturbed"));
     let run = |path: &Path| {
         let mut command = btf();
-        command.arg("enlarge").args([&fixture().model(), path]).args(["--size", "600x1600"]);
+        command
+            .arg("enlarge")
+            .args([&fixture().model(), path])
+            .args(["--method", "paper", "--size", "600x1600"]);
         command
     };
     let code = interrupt(&mut run(&output), "-TERM", || count(&output, "index/c/0") >= 1);

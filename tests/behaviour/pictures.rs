@@ -10,8 +10,8 @@ use btfkit_formats::Samples;
 
 use crate::fixture::{btf, fixture, succeed};
 
-/// The 8-bit pixels of `btf image` at view 4 and light 11 of the fixture.
-fn pixels(source: &Path, view: usize, light: usize) -> Vec<u8> {
+/// The 8-bit pixels of `btf image` at a view and a light of the fixture.
+pub fn pixels(source: &Path, view: usize, light: usize, more: &[&str]) -> Vec<u8> {
     let measurement = Measurement::open(&fixture().measurement()).unwrap();
     let angles = |direction: btfkit_formats::Direction| {
         let (theta, phi) = direction.degrees();
@@ -21,7 +21,15 @@ fn pixels(source: &Path, view: usize, light: usize) -> Vec<u8> {
         [measurement.description().views[view], measurement.description().lights[light]].map(angles);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.png");
-    succeed(btf().arg("image").arg(source).args(["--view", &view, "--light", &light]).arg("--out").arg(&out));
+    succeed(
+        btf()
+            .arg("image")
+            .arg(source)
+            .args(["--view", &view, "--light", &light])
+            .args(more)
+            .arg("--out")
+            .arg(&out),
+    );
     let file = std::io::BufReader::new(std::fs::File::open(&out).unwrap());
     let mut reader = png::Decoder::new(file).read_info().unwrap();
     let mut samples = vec![0; reader.output_buffer_size().unwrap()];
@@ -37,7 +45,7 @@ fn the_measurement_shows_its_samples() {
     let Samples::U8(stored) = stored else { panic!("not 8-bit") };
     let expected: Vec<u8> =
         stored.chunks_exact(lights * 3).flat_map(|texel| &texel[33..36]).copied().collect();
-    assert_eq!(pixels(&fixture().measurement(), 4, 11), expected);
+    assert_eq!(pixels(&fixture().measurement(), 4, 11, &[]), expected);
 }
 
 #[test]
@@ -52,11 +60,11 @@ fn tile_and_enlarged_index_show_the_samples_of_the_representatives() {
         &samples[at..at + channels]
     };
     let expected: Vec<u8> = model.index().unwrap().iter().flat_map(sample).copied().collect();
-    assert_eq!(pixels(&fixture().model(), 7, 2), expected);
+    assert_eq!(pixels(&fixture().model(), 7, 2, &[]), expected);
     let enlarged = Enlarged::open(&fixture().enlarged()).unwrap();
     let index = enlarged.read(enlarged.size().window()).unwrap();
     let expected: Vec<u8> = index.iter().flat_map(sample).copied().collect();
-    assert_eq!(pixels(&fixture().enlarged(), 7, 2), expected);
+    assert_eq!(pixels(&fixture().enlarged(), 7, 2, &[]), expected);
 }
 
 #[test]

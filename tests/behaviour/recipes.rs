@@ -35,6 +35,8 @@ fn another_recipe_in_the_same_place_is_refused_and_the_setting_named() {
             "--size",
             "64x64",
             "--keep-normals",
+            "--method",
+            "paper",
         ]),
         65,
     );
@@ -108,8 +110,12 @@ fn usage_errors_exit_with_2() {
         btf().arg("enlarge").args([&fixture.model(), &big.path().join("b")]).args([
             "--size",
             "9x9",
+            "--method",
+            "paper",
             "--candidates",
             "0",
+            "--method",
+            "paper",
         ]),
         2,
     );
@@ -132,7 +138,14 @@ fn a_model_that_lost_an_array_is_mended_by_the_same_command() {
     let run = || succeed(&mut model_of(&fixture.measurement(), &model));
     run();
     let whole = tree(&model);
-    for lost in ["index/c/0/0", "mrf/level_0/gamma/c/0/0", "tile_source/zarr.json", "normals/c/0/0/0"] {
+    for lost in [
+        "index/c/0/0",
+        "mrf/level_0/gamma/c/0/0",
+        "tile_source/zarr.json",
+        "normals/c/0/0/0",
+        "appearance/features/zarr.json",
+        "appearance/level_1/basis/c/0/0",
+    ] {
         std::fs::remove_file(model.join(lost)).unwrap();
         run();
         assert_eq!(whole, tree(&model), "{lost}");

@@ -82,7 +82,7 @@ pub(super) fn sections(figures: &Figures, settings: &Settings) -> Vec<Section> {
         analysis::normals(figures),
         result::comparison(figures, settings),
         result::lights(settings),
-        result::limits(figures),
+        result::likeness(figures),
         result::sizes(figures),
         result::commands(settings),
     ]

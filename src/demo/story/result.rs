@@ -9,10 +9,14 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
     let size = settings.enlarged;
     let [row, column] = figures.companion_origin;
     let intro = format!(
-        "<p>The same area, {size} texels, covered in three ways. Both repetitions show measured samples; the \
-         enlarged picture shows the model. The second tile has the borders of the first, and the region at \
+        "<p>The same area, {size} texels, covered in four ways. The two repetitions show measured samples, the \
+         two enlargements show the model. The second tile has the borders of the first, and the region at \
          row {row}, column {column} of the measurement as its interior, joined by minimum-error paths on all \
-         four sides (seam visibility {:.2}); which tile stands where is drawn by chance.</p>",
+         four sides (seam visibility {:.2}); which tile stands where is drawn by chance.</p>\
+         <p>The paper synthesises normals as a Gaussian random field and takes for each the cluster that fits its \
+         neighbours. Statistics are kept, shapes are not. The coherent rule, the default of <code>btf enlarge</code>, \
+         makes every texel a texel of the tile whose neighbours continue it as they do in the tile: shapes are kept, \
+         and nothing repeats as a whole.</p>",
         figures.companion_visibility
     );
     let shots = vec![
@@ -29,10 +33,16 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
             "The plane covered by two tiles placed by chance",
         ),
         shot(
+            "enlarged-by-paper",
+            Subject::ByPaper,
+            "<b>Enlarged by the paper's rule</b>",
+            "The plane covered by the index that the paper's rule makes",
+        ),
+        shot(
             "enlarged",
             Subject::ENLARGED,
-            "<b>Enlarged</b> by the model: nothing repeats",
-            "The plane covered by the enlarged index",
+            "<b>Enlarged by the coherent rule</b>",
+            "The plane covered by the index that the coherent rule makes",
         ),
     ];
     let tiles = vec![
@@ -81,31 +91,28 @@ pub(super) fn lights(settings: &Settings) -> Section {
     }
 }
 
-pub(super) fn limits(figures: &Figures) -> Section {
-    let [measured, modelled, enlarged] = figures.greys;
-    let shift = enlarged.mean - measured.mean;
-    let mean = if shift.abs() < 1.0 {
-        "as bright as the tile to a level".to_owned()
-    } else {
-        format!("{:.1} levels {}", shift.abs(), if shift > 0.0 { "brighter" } else { "darker" })
-    };
+pub(super) fn likeness(figures: &Figures) -> Section {
+    let [measured, modelled] = figures.greys;
+    let (enlarged, by_paper) = (&figures.enlarged, &figures.by_paper);
     let intro = format!(
-        "<p>Against the measured tile, the enlarged picture's mean is <b>{mean}</b>, its spread <b>{:.2}</b> \
-         times, and the spread of the means of {BLOCK} × {BLOCK} squares <b>{:.1}</b> times the tile's \
-         (above 1: patches or streaks larger than the material has). The clusters' shares in the enlarged \
-         index overlap with those in the tile by <b>{:.0} %</b> (100 %: the same shares); {} of the {} \
-         clusters are not used at all.</p><p>Where these figures are far from 1, 1 and 100 % the picture is \
-         not yet the material, and the index rule (25) is why: among the candidates it takes the cluster \
-         nearest to those at left and above and asks nothing else. Clusters that are near to everything, \
-         average ones, win and crowd out rare ones such as grooves and highlights; and a region that has \
-         once begun continues along the scan, to the right and downwards. Shapes such as cells are lost \
-         before that: a Gaussian random field of normals holds second-order statistics only. What does hold \
-         is the reflectance of each texel, which is measured, not made.</p>",
-        enlarged.spread / measured.spread,
-        enlarged.block_spread / measured.block_spread,
-        100.0 * figures.histogram_overlap,
-        figures.unused_clusters,
-        figures.cluster.clusters
+        "<p>The shares of the clusters in the enlarged index overlap with those in the tile by <b>{:.0} %</b> with \
+         the coherent rule and by <b>{:.0} %</b> with the paper's (100 %: the same shares); {} and {} of the {} \
+         clusters are not used at all. Under the light of the comparison, the spread of the means of {BLOCK} × \
+         {BLOCK} squares is <b>{:.2}</b> and <b>{:.2}</b> times the tile's: above 1, a picture has patches or \
+         streaks that are larger than those of the material.</p>\
+         <p>The paper's rule (25) takes, of the candidates, the cluster nearest to those at left and above. Average \
+         clusters are near to all others, so they crowd out rare ones such as grooves and highlights, and a region \
+         that has begun goes on along the scan.</p>\
+         <p>What both share: the reflectance of each texel is measured, not made. What the coherent rule cannot do: \
+         show what the tile has not. Where pieces of the tile meet, a long structure may step aside; a larger tile \
+         has fewer such places.</p>",
+        100.0 * enlarged.histogram_overlap,
+        100.0 * by_paper.histogram_overlap,
+        enlarged.unused_clusters,
+        by_paper.unused_clusters,
+        figures.cluster.clusters,
+        enlarged.grey.block_spread / measured.block_spread,
+        by_paper.grey.block_spread / measured.block_spread,
     );
     let row = |name: &str, grey: Grey| {
         vec![
@@ -121,10 +128,11 @@ pub(super) fn limits(figures: &Figures) -> Section {
         rows: vec![
             row("Tile, measured", measured),
             row("Tile, by the model", modelled),
-            row("Enlarged", enlarged),
+            row("Enlarged by the coherent rule", enlarged.grey),
+            row("Enlarged by the paper's rule", by_paper.grey),
         ],
     };
-    Section { title: "Where the result is weak", blocks: vec![text(intro), Block::Table(table)] }
+    Section { title: "How near the result comes", blocks: vec![text(intro), Block::Table(table)] }
 }
 
 pub(super) fn sizes(figures: &Figures) -> Section {
@@ -175,7 +183,7 @@ pub(super) fn sizes(figures: &Figures) -> Section {
             (format!("{} (JPEG)", names::ARCHIVE), archive),
             (format!("{} (samples and L*, lossless)", names::MEASUREMENT), measurement),
             (format!("{} (all of the model)", names::MODEL), model),
-            (format!("{} (index and synthesised normals)", names::ENLARGED), enlarged),
+            (format!("{} (index, and which texel of the tile each texel is)", names::ENLARGED), enlarged),
         ]
         .map(|(name, bytes)| vec![name, bytes_text(bytes)])
         .into(),
@@ -187,8 +195,8 @@ pub(super) fn sizes(figures: &Figures) -> Section {
 }
 
 pub(super) fn commands(settings: &Settings) -> Section {
-    let [archive, measurement, model, enlarged] =
-        [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED];
+    let [archive, measurement, model, enlarged, by_paper] =
+        [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED, names::BY_PAPER];
     let Settings { sample, directions, clusters, passes, tolerance, candidates, seed, .. } = *settings;
     let (material, size) = (settings.material(), settings.enlarged);
     let intro = "<p>Typed in the demo's folder, these name the same steps with the same settings: what is \
@@ -197,7 +205,7 @@ pub(super) fn commands(settings: &Settings) -> Section {
     let seed = format!("--seed {seed}");
     let directions = format!("--views {directions} --lights {directions}");
     let limits = format!("--passes {passes} --tolerance {tolerance}");
-    let synthesis = format!("--candidates {candidates} --keep-normals");
+    let paper = format!("--method paper --candidates {candidates} --keep-normals");
     let lines = vec![
         format!("btf sample {archive} --material {material} --size {sample} {directions} {seed}"),
         format!("btf import {archive} {measurement}"),
@@ -206,7 +214,9 @@ pub(super) fn commands(settings: &Settings) -> Section {
         format!("btf normals {measurement} {model}"),
         format!("btf fit {model} --mrf 3d"),
         format!("btf compare {model} {measurement} --picture compare.png"),
-        format!("btf enlarge {model} {enlarged} --size {size} {seed} {synthesis}"),
+        format!("btf appearance {model}"),
+        format!("btf enlarge {model} {enlarged} --size {size} {seed}"),
+        format!("btf enlarge {model} {by_paper} --size {size} {seed} {paper}"),
         format!("btf image {enlarged} --light 45,100 --view 0,0 --out enlarged.png"),
         format!("btf image {model} --what normals --out normals.png"),
     ];

@@ -2,9 +2,13 @@
 //!
 //! A [`Rule`] is a method with its options, opened on a model; the plan names the outputs and hands each to the rule.
 
+mod blocks;
 pub mod coherent;
 pub mod paper;
+pub mod patches;
 mod pipeline;
+pub mod quilt;
+mod verdict;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -18,8 +22,9 @@ use crate::run::recipe::METHOD;
 use crate::shape::Size;
 use crate::stage::cluster;
 use crate::stage::import::Shard;
-use crate::store::enlarged::Method;
+use crate::store::enlarged::{Enlarged, Method};
 use crate::store::model::{Model, Stage, index_bytes};
+pub use verdict::Verdict;
 
 /// How to enlarge.
 #[derive(Clone, Debug)]
@@ -47,6 +52,10 @@ pub enum By {
     Paper(paper::Options),
     /// Source positions that continue their neighbours.
     Coherent(coherent::Options),
+    /// Pieces of the tile on a grid.
+    Patches(patches::Options),
+    /// Image quilting.
+    Quilt(quilt::Options),
 }
 
 /// What all methods are given of a model and of the options.
@@ -75,7 +84,7 @@ struct Units {
 trait Rule {
     /// Its name in recipes.
     fn method(&self) -> Method;
-    /// What a unit of an output is, and how many there are.
+    /// What the units of an output are, in the plural, and how many there are.
     fn units(&self, subject: &Subject) -> (&'static str, usize);
     /// What the bytes of an output depend on, beside the model, the size, the seed and whether it joins at its borders.
     fn recipe(&self) -> Map<String, Value>;
@@ -105,12 +114,14 @@ pub struct Report {
     pub stored_bytes: u64,
     /// Bytes of the enlarged BTF's raw samples.
     pub raw_bytes: u64,
-    /// What is done at once and either done or not.
+    /// What its units are, in the plural: each is done at once, and either done or not.
     pub unit: &'static str,
     /// Units found done.
     pub found: usize,
     /// Units written by this run.
     pub written: usize,
+    /// Whether it looks like its tile; absent while other runs have units to make.
+    pub verdict: Option<Verdict>,
 }
 
 /// Checks that the model is complete and can be enlarged to this size.
@@ -122,6 +133,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let rule: Box<dyn Rule> = match &options.by {
         By::Paper(by) => Box::new(paper::Paper::open(&subject, by)?),
         By::Coherent(by) => Box::new(coherent::Coherent::open(&subject, by)?),
+        By::Patches(by) => Box::new(patches::Patches::open(&subject, by)?),
+        By::Quilt(by) => Box::new(quilt::Quilting::open(&subject, by)?),
     };
     let several = options.seeds.start() != options.seeds.end();
     let output = |seed: u64| {
@@ -200,15 +213,20 @@ impl Plan {
         let units = self.rule.make(&self.subject, &self.outputs, context)?;
         let clusters = &self.subject.clusters;
         let texel_bytes = clusters.tile_bytes / self.subject.tile.texels() as u64;
-        let report = |(output, units): (&Output, Units)| Report {
-            output: output.path.clone(),
-            seed: output.seed,
-            stored_bytes: self.subject.index_bytes() + clusters.representative_bytes,
-            raw_bytes: texel_bytes * self.subject.options.size.texels() as u64,
-            unit: self.rule.units(&self.subject).0,
-            found: units.found,
-            written: units.written,
+        let report = |(output, units): (&Output, Units)| {
+            let enlarged = Enlarged::open(&output.path)?;
+            let (subject, method) = (&self.subject, self.rule.method());
+            Ok(Report {
+                output: output.path.clone(),
+                seed: output.seed,
+                stored_bytes: self.subject.index_bytes() + clusters.representative_bytes,
+                raw_bytes: texel_bytes * self.subject.options.size.texels() as u64,
+                unit: self.rule.units(&self.subject).0,
+                found: units.found,
+                written: units.written,
+                verdict: context.install(|| subject.verdict(&enlarged, method))?,
+            })
         };
-        Ok(self.outputs.iter().zip(units).map(report).collect())
+        self.outputs.iter().zip(units).map(report).collect()
     }
 }

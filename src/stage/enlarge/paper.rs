@@ -153,7 +153,7 @@ impl Rule for Paper {
     }
 
     fn units(&self, subject: &Subject) -> (&'static str, usize) {
-        ("row of shards", subject.options.size.height.div_ceil(SHARD_SIDE))
+        ("rows of shards", subject.options.size.height.div_ceil(SHARD_SIDE))
     }
 
     fn recipe(&self) -> Map<String, Value> {

@@ -288,7 +288,7 @@ impl Scene {
 }
 
 /// Source texels of some rows of a plane; pieces of them are made on all threads.
-fn plane_rows(plane: &Plane, variation: &Variation, area: Area) -> Result<Vec<u32>> {
+pub(crate) fn plane_rows(plane: &Plane, variation: &Variation, area: Area) -> Result<Vec<u32>> {
     let Size { height, width } = area.size;
     let columns: Vec<usize> = (0..width).step_by(PLANE_SIDE).collect();
     let piece = |&left: &usize| {
@@ -373,13 +373,18 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
     let size = enlarged.size();
     let source = match options.subject {
         Subject::Appearance { view, light } if options.values == Values::Model => {
-            let colors = cluster_colors(&model_of(&enlarged, options)?, view, light)?;
+            let colors = cluster_colors(
+                &model_of(&enlarged, &options.source, options.model.as_deref())?,
+                view,
+                light,
+            )?;
             Source::Clusters { enlarged, colors }
         }
         Subject::Index => Source::Index(enlarged),
         Subject::Normals if enlarged.has_normals() => Source::Normals(enlarged),
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
-            let tile = tile_picture(&model_of(&enlarged, options)?, options, context)?;
+            let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
+            let tile = tile_picture(&model, options, context)?;
             Source::Sources { enlarged, tile }
         }
         Subject::Normals => {
@@ -391,19 +396,19 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
                 "{} does not say which texel of the tile each of its texels is",
                 options.source.display()
             ))
-            .hint("enlarge by --method coherent, without --no-source"));
+            .hint("enlarge by another --method than paper, without --no-source"));
         }
     };
     Ok((source, size))
 }
 
-/// The model that an enlarged index refers to.
-fn model_of(enlarged: &Enlarged, options: &Options) -> Result<Model> {
+/// The model that an enlarged index at a path refers to; where it is not named, it lies beside it.
+pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) -> Result<Model> {
     let attributes = enlarged.attributes()?;
     let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or_default().to_owned();
-    let path = match &options.model {
-        Some(path) => path.clone(),
-        None => beside(&options.source, &text(attributes.get("model_name"))),
+    let path = match named {
+        Some(path) => path.to_owned(),
+        None => beside(place, &text(attributes.get("model_name"))),
     };
     let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
     if text(attributes.get("recipe").and_then(|recipe| recipe.get("model")))
@@ -411,7 +416,7 @@ fn model_of(enlarged: &Enlarged, options: &Options) -> Result<Model> {
     {
         return Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
-            options.source.display(),
+            place.display(),
             path.display()
         )));
     }

@@ -1,0 +1,159 @@
+use std::path::PathBuf;
+
+use btfkit::error::{Error, Result};
+use btfkit::likeness::Measure;
+use btfkit::picture::Ending;
+use btfkit::run::Context;
+use btfkit::shape::Size;
+use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
+use btfkit::store::mapped::write_file;
+use clap::Args;
+
+use super::Tell;
+use super::table::{row, table};
+
+/// How far is an enlargement from real crops of the material, in units of how far those are from each other?
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf judge wood-4k.zarr --against wood.zarr
+  btf judge wood-4k.zarr --against wood.zarr --sheet judged.png --json judged.json
+  btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless plane, not stored
+  btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
+J is the worst of five measures; 1 is as good as another real crop. docs/judging.md tells what each measure sees.")]
+pub(super) struct Judge {
+    /// An enlarged index, or a model with --size
+    subject: PathBuf,
+    /// The measurement that the model was made of
+    #[arg(long, value_name = "MEASUREMENT")]
+    against: PathBuf,
+    /// The model of an enlarged index [default: beside it, under the name it had]
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT
+    #[arg(long)]
+    size: Option<Size>,
+    /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the directions]
+    #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair)]
+    pair: Vec<[usize; 2]>,
+    /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]
+    #[arg(long, value_name = "N")]
+    crop: Option<usize>,
+    /// Write all figures to a JSON file
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the pictures that were judged, side by side
+    #[arg(long, value_name = "FILE.png")]
+    sheet: Option<PathBuf>,
+}
+
+impl Judge {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        if let Some(path) = &self.sheet {
+            Ending::of(path)?;
+        }
+        let (report, sheet) = judge::run(
+            &judge::Options {
+                subject: self.subject.clone(),
+                measurement: self.against.clone(),
+                model: self.model.clone(),
+                size: self.size,
+                pairs: self.pair.clone(),
+                crop: self.crop,
+            },
+            context,
+        )?;
+        if let Some(path) = &self.json {
+            let text =
+                serde_json::to_string_pretty(&report).map_err(|error| Error::internal(error.to_string()))?;
+            write_file(path, text.as_bytes())?;
+        }
+        if let Some(path) = &self.sheet {
+            sheet.write(path)?;
+        }
+        tell.line(told(&report));
+        Ok(())
+    }
+}
+
+fn told(report: &Report) -> String {
+    let [height, width] = report.size;
+    let origin = match report.origin {
+        Origin::HeldOut => "parts of the measurement that the tile did not use",
+        Origin::Quadrants => "quadrants of the measurement, which the tile may have used",
+    };
+    let mut lines = vec![
+        format!(
+            "{}: {}, {} crops of {} texels",
+            report.subject.display(),
+            Size::new(height, width),
+            report.crops.len(),
+            report.crop
+        ),
+        format!("by {} real crops: {origin}", report.real_crops.len()),
+        String::new(),
+    ];
+    let mut head = vec![String::new()];
+    head.extend(Measure::ALL.map(|measure| measure.name().to_owned()));
+    head.extend(row!["J", "worst", "excess peak"]);
+    let mut rows = vec![head, named("exemplar repeated", &report.mean.own)];
+    rows.extend(report.mean.alone.as_ref().map(|alone| named("enlargement alone", alone)));
+    rows.push(named("with the model", &report.mean.with_model));
+    if let Normals::Judged { x, y, .. } = &report.normals {
+        rows.push(named("n_x, exemplar", &x.own));
+        rows.push(named("n_x, enlargement", &x.enlarged));
+        rows.push(named("n_y, exemplar", &y.own));
+        rows.push(named("n_y, enlargement", &y.enlarged));
+    }
+    lines.push(table(&rows));
+    if let Normals::Absent { reason } = &report.normals {
+        lines.push(format!("normals not judged: {reason}"));
+    }
+    lines.push(String::new());
+    let mut pairs = vec![row!["J by pair", "exemplar", "alone", "with the model"]];
+    for pair in &report.pairs {
+        let alone = pair.rows.alone.as_ref().map(|row| row.j);
+        pairs.push(row![
+            format!("view {} light {}", degrees(pair.view_deg), degrees(pair.light_deg)),
+            number(Some(pair.rows.own.j)),
+            number(alone),
+            number(Some(pair.rows.with_model.j)),
+        ]);
+    }
+    lines.push(table(&pairs));
+    lines.push(String::new());
+    let mut whole = vec![row!["clusters in common", number(Some(report.verdict.shares))]];
+    if let Some(share) = report.verdict.largest_copy {
+        whole.push(row!["largest copy", format!("{:.2} %", 100.0 * share)]);
+    }
+    whole.push(row!["bands in rows, columns", number(report.bands[0]), number(report.bands[1])]);
+    whole.push(row!["wavy bands", number(report.wavy_bands[0]), number(report.wavy_bands[1])]);
+    if let Some(peak) = report.lattice {
+        whole.push(row!["lattice, exemplar's", number(Some(peak.enlarged)), number(Some(peak.own))]);
+    }
+    lines.push(table(&whole));
+    lines.join("\n")
+}
+
+fn named(name: &str, judged: &Row) -> Vec<String> {
+    let mut cells = vec![name.to_owned()];
+    cells.extend(Measure::ALL.map(|measure| number(judged.measures.get(measure.name()).copied())));
+    cells.extend([number(Some(judged.j)), judged.worst.clone(), number(Some(judged.excess_peak))]);
+    cells
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.2}"))
+}
+
+fn degrees([theta, phi]: [f64; 2]) -> String {
+    format!("{theta:.0},{phi:.0}")
+}
+
+/// `30,10`: numbers of a view and a light.
+fn pair(text: &str) -> std::result::Result<[usize; 2], String> {
+    let numbers = text
+        .split_once(',')
+        .and_then(|(view, light)| Some([view.trim().parse().ok()?, light.trim().parse().ok()?]));
+    numbers.ok_or_else(|| format!("expected VIEW,LIGHT such as 30,10, got {text:?}"))
+}

@@ -1,0 +1,130 @@
+//! Does an enlargement look like its tile? Cheap measures on a window in its middle; `btf judge` measures more.
+
+use serde::Serialize;
+
+use super::Subject;
+use crate::error::Result;
+use crate::likeness::Lightness;
+use crate::likeness::copies::LargestCopy;
+use crate::likeness::verdict::{Tally, WINDOW_SIDE, excess_peak};
+use crate::shape::{Size, Window};
+use crate::stage::judge::frontal_pair;
+use crate::store::enlarged::{Enlarged, Method};
+
+/// Shares of clusters in common below which rare parts of the material are being lost.
+const LEAST_SHARES: f64 = 0.9;
+
+/// Excess of the autocorrelation's peak above which repetition can be seen; as far below zero, order is lost.
+const MOST_EXCESS: f64 = 0.15;
+
+/// Share of the window in one unbroken copy above which an enlargement is mostly a copy.
+const MOST_COPY: f64 = 0.25;
+
+/// What the cheap measures say of an enlargement.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// Shares of clusters that the tile and the window have in common, 0 to 1.
+    pub shares: f64,
+    /// By how much the largest autocorrelation at shifts of 12 texels or more exceeds the tile's.
+    pub excess_peak: f64,
+    /// Share of the window in the largest unbroken copy of the tile; absent where sources are not known.
+    pub largest_copy: Option<f64>,
+    /// What makes the enlargement look unlike its tile, and what to do about it.
+    pub warnings: Vec<String>,
+}
+
+impl Subject {
+    /// The verdict on an output; none on one that other runs have not finished yet.
+    pub(super) fn verdict(&self, output: &Enlarged, method: Method) -> Result<Option<Verdict>> {
+        if !output.is_whole() {
+            return Ok(None);
+        }
+        let window = middle(output.size());
+        let (index, source) = (output.read(window)?, output.read_source(window)?);
+        let tile = self.model.index()?;
+        let wraps = self.model.tile()?.wraps;
+        let copy = source.is_some().then(|| LargestCopy::new(self.tile.window(), self.tile.width, wraps));
+        let mut tally = Tally::new(&tile, self.clusters.clusters, copy);
+        for y in 0..window.size.height {
+            let row = y * window.size.width..(y + 1) * window.size.width;
+            tally.push(&index[row.clone()], source.as_ref().map_or(&[], |source| &source[row]));
+        }
+        let lightness = self.lightness()?;
+        let picture = |size: Size, index: &[u16]| {
+            Lightness::of_codes(size, index.iter().map(|&cluster| lightness[usize::from(cluster)]))
+        };
+        let whole = picture(self.tile, &tile).part(middle(self.tile));
+        let excess_peak = excess_peak(&picture(window.size, &index), &whole);
+        let found = tally.verdict();
+        let warnings = warnings(found.shares, excess_peak, found.largest_copy, method);
+        Ok(Some(Verdict { shares: found.shares, excess_peak, largest_copy: found.largest_copy, warnings }))
+    }
+
+    /// L* code of each cluster, from the most frontal view under its lowest light, which shows relief. As many as an
+    /// index can name, so that none leads astray.
+    fn lightness(&self) -> Result<Vec<u8>> {
+        let [views, lights] = self.model.directions()?;
+        let [view, light] = frontal_pair(&views, &lights)?;
+        let brdf = views.len() * lights.len();
+        let mut codes = vec![0; usize::from(u16::MAX) + 1];
+        let centres = self.model.centres()?;
+        for (code, &centre) in
+            codes.iter_mut().zip(centres.iter().skip(view * lights.len() + light).step_by(brdf))
+        {
+            *code = centre;
+        }
+        Ok(codes)
+    }
+}
+
+/// The window in the middle of a plane, of at most [`WINDOW_SIDE`] texels a side.
+fn middle(plane: Size) -> Window {
+    let size = Size::new(plane.height.min(WINDOW_SIDE), plane.width.min(WINDOW_SIDE));
+    Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
+}
+
+fn warnings(shares: f64, excess_peak: f64, largest_copy: Option<f64>, method: Method) -> Vec<String> {
+    let another = "take --method coherent, which keeps structure";
+    let advise = |coherent: &'static str| if method == Method::Coherent { coherent } else { another };
+    let mut warnings = Vec::new();
+    if shares < LEAST_SHARES {
+        let advice = advise("take a larger tile, or the whole plane (btf tile --tile none)");
+        warnings.push(format!(
+            "only {:.0} % of the clusters' shares are those of the tile, rare ones are being lost: {advice}",
+            100.0 * shares
+        ));
+    }
+    if excess_peak < -MOST_EXCESS {
+        let advice = advise("if the material is regular, name its lattice (btf appearance --lattice)");
+        warnings.push(format!("the tile is more regular by {:.2}: {advice}", -excess_peak));
+    }
+    if excess_peak > MOST_EXCESS || largest_copy.is_some_and(|copy| copy > MOST_COPY) {
+        let advice =
+            advise("take a larger tile, or the whole plane (btf tile --tile none), or a larger --jitter");
+        warnings.push(format!("large parts are copies of the tile, repetition will be seen: {advice}"));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_fault_has_its_warning_and_none_is_none() {
+        let of = |shares, peak, copy| warnings(shares, peak, copy, Method::Coherent).len();
+        assert_eq!(of(0.95, 0.0, Some(0.02)), 0);
+        assert_eq!(of(0.85, 0.0, None), 1);
+        assert_eq!(of(0.95, -0.3, None), 1);
+        assert_eq!(of(0.95, 0.3, Some(0.02)), 1);
+        assert_eq!(of(0.95, 0.0, Some(0.5)), 1);
+        assert!(warnings(0.5, 0.0, None, Method::Paper)[0].contains("--method coherent"));
+        assert!(!warnings(0.5, 0.0, None, Method::Coherent)[0].contains("--method"));
+    }
+
+    #[test]
+    fn the_window_lies_in_the_middle() {
+        let window = middle(Size::new(1000, 300));
+        assert_eq!((window.y, window.x, window.size), (244, 0, Size::new(512, 300)));
+    }
+}

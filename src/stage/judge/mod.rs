@@ -1,0 +1,342 @@
+//! How far an enlargement is from real crops of the material, in units of how far those are from each other.
+//!
+//! Only crops are read, and rows that stream by. `docs/judging.md` tells what the figures mean.
+
+mod crops;
+mod normals;
+mod pairs;
+mod report;
+mod sheet;
+mod subject;
+mod whole;
+
+use std::path::PathBuf;
+
+use btfkit_formats::Direction;
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::lattice::WaveCounts;
+use crate::likeness::autocorrelation::near_shift;
+use crate::likeness::repetition::wavy_bands;
+use crate::likeness::{Judge, Judgement, Lightness};
+use crate::picture::Picture;
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::shape::{Size, Window};
+use crate::stage::cluster::open_measurement_of;
+use crate::store::measurement::Measurement;
+use crate::store::model::{Model, Stage};
+use crate::texel::tile::Tile;
+pub use crops::Origin;
+pub use report::{LatticePeak, NormalRows, Normals, Pair, Report, Row, Rows};
+use sheet::Panels;
+use subject::Subject;
+use whole::{Codes, Material};
+
+/// Rows of the measurement that are read together: a row of chunks.
+const BAND_ROWS: usize = 16;
+
+/// Side of the window in which wavy bands are sought.
+const WAVY_SIDE: usize = 768;
+
+/// The pair (view, light) that shows relief best: the most frontal view under its lowest light.
+///
+/// # Errors
+/// No directions.
+pub(crate) fn frontal_pair(views: &[Direction], lights: &[Direction]) -> Result<[usize; 2]> {
+    let pair = pairs::spread(views, lights, 1).first().copied();
+    pair.ok_or_else(|| Error::input("got no view or no light, expected one at least"))
+}
+
+/// What to judge, and by what.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// An enlarged index, or a model, whose endless plane is judged.
+    pub subject: PathBuf,
+    /// The measurement that the model was made of.
+    pub measurement: PathBuf,
+    /// The model of an enlarged index; beside it under its recorded name where absent.
+    pub model: Option<PathBuf>,
+    /// Rows and columns of the part of the endless plane.
+    pub size: Option<Size>,
+    /// Numbers of views and lights; some spread over the directions where there are none.
+    pub pairs: Vec<[usize; 2]>,
+    /// Side of the crops; as large as fit, up to 128, where absent.
+    pub crop: Option<usize>,
+}
+
+/// Where pictures are cut.
+struct Crops {
+    side: usize,
+    reals: Vec<Window>,
+    enlarged: Vec<Window>,
+}
+
+/// What was found under one pair.
+struct Found {
+    own: Judgement,
+    alone: Option<Judgement>,
+    with_model: Judgement,
+    floor: [f64; crate::likeness::Measure::ALL.len()],
+    lattice: Option<[f64; 2]>,
+    panels: Panels,
+}
+
+/// Judges. The report, and a sheet of the pictures that were judged.
+///
+/// # Errors
+/// Stores that do not belong together or are not there yet, a measurement or an enlargement too small to cut crops from,
+/// pairs that were not measured, and those of reading.
+pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)> {
+    let (subject, model) =
+        context.install(|| Subject::open(&options.subject, options.model.as_deref(), options.size))?;
+    let measurement = open_measurement_of(&model, &options.measurement)?;
+    let description = measurement.description();
+    let pairs = pairs_of(options, &measurement)?;
+    let (tile, index) = (model.tile()?, model.index()?);
+    let centres = model.centres()?;
+    let brdf = description.views.len() * description.lights.len();
+    if !tile.bounds().fits(description.size) || !centres.len().is_multiple_of(brdf) {
+        return Err(Error::input(format!(
+            "{} does not fit {}",
+            model.path().display(),
+            measurement.path().display()
+        )));
+    }
+    let (exemplar, wraps, lattice) = exemplar_of(&model, &tile)?;
+    let clusters = centres.len() / brdf;
+    let material = Material { tile: tile.size, index: &index, exemplar, wraps, clusters };
+    let Size { height, width } = subject.size();
+    let reals = crops::real_crops(description.size, tile.bounds(), height.min(width), options.crop)?;
+    let crops = Crops {
+        side: reals.side,
+        reals: reals.windows,
+        enlarged: crops::crops_of(subject.size(), reals.side),
+    };
+    let mut codes = Vec::with_capacity(pairs.len());
+    context.progress.begin("read", pairs.len() as u64, Counted::Items("pairs"));
+    for &[view, light] in &pairs {
+        let at = view * description.lights.len() + light;
+        let of_clusters = centres.iter().skip(at).step_by(brdf).copied().collect();
+        codes.push(Codes {
+            tile: tile_codes(&measurement, &tile, [view, light], context)?,
+            clusters: of_clusters,
+        });
+        context.progress.advance(1);
+    }
+    context.progress.end();
+    let (verdict, bands) = whole::look(&subject, &material, &codes, context)?;
+    let periods = lattice.lattice(exemplar.size).vectors();
+    let mut found = Vec::with_capacity(pairs.len());
+    context.progress.begin("judge", pairs.len() as u64, Counted::Items("pairs"));
+    for (&pair, codes) in pairs.iter().zip(&codes) {
+        context.check_stop()?;
+        let real: Vec<Lightness> =
+            crops.reals.iter().map(|&window| real_crop(&measurement, pair, window)).collect::<Result<_>>()?;
+        found.push(context.install(|| judge_pair(&subject, &material, &crops, codes, &real, &periods))?);
+        context.progress.advance(1);
+    }
+    context.progress.end();
+    let wavy = match codes.first() {
+        Some(codes) => context.install(|| wavy(&subject, &material, codes))?,
+        None => [None; 2],
+    };
+    let normals = normals::judge(&subject, &model, &measurement, &material, &crops, context)?;
+    let corner = |window: &Window| [window.y, window.x];
+    let report = Report {
+        subject: options.subject.clone(),
+        size: [height, width],
+        measurement: options.measurement.clone(),
+        measurement_digest: measurement.digest().to_owned(),
+        exemplar: [exemplar.y, exemplar.x, exemplar.size.height, exemplar.size.width],
+        origin: reals.origin,
+        crop: crops.side,
+        real_crops: crops.reals.iter().map(corner).collect(),
+        crops: crops.enlarged.iter().map(corner).collect(),
+        pairs: pairs.iter().zip(&found).map(|(&pair, found)| told(&measurement, pair, found)).collect(),
+        mean: mean(&found)?,
+        normals,
+        verdict,
+        bands,
+        wavy_bands: wavy,
+        lattice: lattice_peak(&found),
+    };
+    let panels: Vec<Panels> = found.into_iter().map(|found| found.panels).collect();
+    let sheet = sheet::sheet(&panels, &report);
+    Ok((report, sheet))
+}
+
+/// The pairs to judge under.
+fn pairs_of(options: &Options, measurement: &Measurement) -> Result<Vec<[usize; 2]>> {
+    let description = measurement.description();
+    let (views, lights) = (description.views.len(), description.lights.len());
+    match options.pairs.iter().find(|&&[view, light]| view >= views || light >= lights) {
+        Some([view, light]) => Err(Error::usage(format!(
+            "got the pair {view},{light}, expected a view below {views} and a light below {lights}: `btf info` lists them"
+        ))),
+        None if options.pairs.is_empty() => {
+            Ok(pairs::spread(&description.views, &description.lights, pairs::COUNT))
+        }
+        None => Ok(options.pairs.clone()),
+    }
+}
+
+/// The part of the tile that enlargements are made of, whether it wraps, and its lattice: that of the appearance where
+/// there is one.
+fn exemplar_of(model: &Model, tile: &Tile) -> Result<(Window, bool, WaveCounts)> {
+    if model.stage(Stage::Appearance)?.is_none() {
+        return Ok((tile.size.window(), tile.wraps, WaveCounts::default()));
+    }
+    let appearance = model.appearance()?;
+    appearance.check(tile.size)?;
+    Ok((appearance.exemplar, appearance.wraps, appearance.lattice))
+}
+
+/// L* codes of the texels of a tile, as measured under a pair.
+fn tile_codes(
+    measurement: &Measurement,
+    tile: &Tile,
+    [view, light]: [usize; 2],
+    context: &Context<'_>,
+) -> Result<Vec<u8>> {
+    let bounds = tile.bounds();
+    let mut plane = Vec::with_capacity(bounds.size.texels());
+    for top in (0..bounds.size.height).step_by(BAND_ROWS) {
+        context.check_stop()?;
+        let rows = BAND_ROWS.min(bounds.size.height - top);
+        let band = Window { y: bounds.y + top, x: bounds.x, size: Size::new(rows, bounds.size.width) };
+        plane.extend(codes_of(measurement, [view, light], band)?);
+    }
+    Ok(tile.offsets_in_bounds().into_iter().map(|at| plane[at]).collect())
+}
+
+/// L* codes of a window under a pair.
+fn codes_of(
+    measurement: &Measurement,
+    [view, light]: [usize; 2],
+    window: Window,
+) -> Result<impl Iterator<Item = u8> + use<>> {
+    let lights = measurement.description().lights.len();
+    Ok(measurement.read_luminance(view, window)?.into_iter().skip(light).step_by(lights))
+}
+
+fn real_crop(measurement: &Measurement, pair: [usize; 2], window: Window) -> Result<Lightness> {
+    Ok(Lightness::of_codes(window.size, codes_of(measurement, pair, window)?))
+}
+
+/// Crops of the plane that repeats an exemplar, at places spread over it.
+fn repeated_crops(exemplar: &Lightness, side: usize) -> Vec<Lightness> {
+    let places = |length: usize| (0..3).map(move |n| n * length / 3);
+    let size = Size::new(side, side);
+    let row = |y: usize| places(exemplar.size.width).map(move |x| exemplar.repeated(y, x, size));
+    places(exemplar.size.height).flat_map(row).collect()
+}
+
+fn judge_pair(
+    subject: &Subject,
+    material: &Material<'_>,
+    crops: &Crops,
+    codes: &Codes,
+    real: &[Lightness],
+    periods: &[[f64; 2]],
+) -> Result<Found> {
+    let judge = Judge::new(real)?;
+    let tile = Lightness::of_codes(material.tile, codes.tile.iter().copied());
+    let repeated = repeated_crops(&tile.part(material.exemplar), crops.side);
+    let (mut alone, mut with_model) = (Vec::new(), Vec::new());
+    for &window in &crops.enlarged {
+        let texels = subject.texels(window, material.clusters, material.tile)?;
+        let of_cluster = |&cluster: &u16| codes.clusters[usize::from(cluster)];
+        with_model.push(Lightness::of_codes(window.size, texels.index.iter().map(of_cluster)));
+        if let Some(source) = texels.source {
+            let of_texel = |&texel: &u32| codes.tile[texel as usize];
+            alone.push(Lightness::of_codes(window.size, source.iter().map(of_texel)));
+        }
+    }
+    let seen = if alone.is_empty() { &with_model } else { &alone };
+    let lattice = lattice_of(seen, &repeated, periods);
+    let middle = crops.enlarged.len() / 2;
+    Ok(Found {
+        own: judge.judge(&repeated)?,
+        alone: if alone.is_empty() { None } else { Some(judge.judge(&alone)?) },
+        with_model: judge.judge(&with_model)?,
+        floor: judge.floor(),
+        lattice,
+        panels: Panels {
+            real: real[0].clone(),
+            alone: alone.get(middle).cloned(),
+            with_model: with_model[middle].clone(),
+        },
+    })
+}
+
+/// Mean autocorrelation at the periods of a lattice that half a crop holds: of an enlargement and of its exemplar.
+fn lattice_of(enlarged: &[Lightness], own: &[Lightness], periods: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let side = enlarged.first()?.size.height as f64;
+    let fits = |period: &&[f64; 2]| period.iter().all(|length| length.abs() <= side / 2.0);
+    let periods: Vec<[f64; 2]> = periods.iter().filter(fits).copied().collect();
+    let mean = |pictures: &[Lightness]| {
+        let peaks: Vec<f64> = pictures
+            .par_iter()
+            .flat_map_iter(|picture| periods.iter().map(|&period| near_shift(picture, period)))
+            .collect();
+        crate::likeness::mean(&peaks)
+    };
+    (!periods.is_empty()).then(|| [mean(enlarged), mean(own)])
+}
+
+fn lattice_peak(found: &[Found]) -> Option<LatticePeak> {
+    let peaks: Vec<[f64; 2]> = found.iter().filter_map(|found| found.lattice).collect();
+    let mean =
+        |which: usize| crate::likeness::mean(&peaks.iter().map(|peak| peak[which]).collect::<Vec<_>>());
+    (!peaks.is_empty()).then(|| LatticePeak { enlarged: mean(0), own: mean(1) })
+}
+
+/// The window in the middle of a plane, of at most so many texels a side.
+fn middle(plane: Size, most: usize) -> Window {
+    let size = Size::new(plane.height.min(most), plane.width.min(most));
+    Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
+}
+
+/// Wavy bands in a window in the middle.
+fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Option<f64>; 2]> {
+    let window = middle(subject.size(), WAVY_SIDE);
+    let texels = subject.texels(window, material.clusters, material.tile)?;
+    let values = match texels.source {
+        Some(source) => source.iter().map(|&texel| codes.tile[texel as usize]).collect::<Vec<_>>(),
+        None => texels.index.iter().map(|&cluster| codes.clusters[usize::from(cluster)]).collect(),
+    };
+    Ok(wavy_bands(&Lightness::of_codes(window.size, values), material.exemplar.size))
+}
+
+fn told(measurement: &Measurement, [view, light]: [usize; 2], found: &Found) -> Pair {
+    let description = measurement.description();
+    let degrees = |direction: Direction| {
+        let (theta, phi) = direction.degrees();
+        [theta, phi]
+    };
+    Pair {
+        view,
+        light,
+        view_deg: degrees(description.views[view]),
+        light_deg: degrees(description.lights[light]),
+        floor: report::by_name(&found.floor),
+        rows: Rows {
+            own: (&found.own).into(),
+            alone: found.alone.as_ref().map(Row::from),
+            with_model: (&found.with_model).into(),
+        },
+    }
+}
+
+/// Means over the pairs.
+fn mean(found: &[Found]) -> Result<Rows> {
+    let row = |judgements: Vec<Judgement>| Judgement::mean(&judgements).as_ref().map(Row::from);
+    let none = || Error::usage("no pair of directions to judge under");
+    Ok(Rows {
+        own: row(found.iter().map(|found| found.own).collect()).ok_or_else(none)?,
+        alone: row(found.iter().filter_map(|found| found.alone).collect()),
+        with_model: row(found.iter().map(|found| found.with_model).collect()).ok_or_else(none)?,
+    })
+}

@@ -131,6 +131,15 @@ impl Enlarged {
         let keeps = |name: &str| attributes.get("recipe").and_then(|r| r.get(name)?.as_bool()) == Some(true);
         let source = keeps("source").then(|| store.open_array("source")).transpose()?;
         let normals = keeps("keep_normals").then(|| store.open_array("normals")).transpose()?;
+        for (name, array) in [("source", &source), ("normals", &normals)] {
+            let shape = array.as_ref().map_or(index.shape(), |array| array.shape());
+            if !shape.starts_with(index.shape()) {
+                return Err(Error::input(format!(
+                    "{}: {name}: got shape {shape:?}, expected the {height} rows and {width} columns of the index",
+                    path.display()
+                )));
+            }
+        }
         let wide = *index.data_type() == u16::data_type();
         Ok(Self { store, size: Size::new(height as usize, width as usize), wide, index, source, normals })
     }

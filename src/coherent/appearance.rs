@@ -71,6 +71,9 @@ pub struct Basis {
 /// Levels, counted from the coarsest, at which repetition costs.
 const REPETITION_LEVELS: usize = 2;
 
+/// Longest side of an exemplar, in texels of a level, at which repetition costs there: each pass reads so far away.
+const REPETITION_FARTHEST: usize = 64;
+
 /// Most that repetition may cost, so that sums fit 32 bits.
 const REPETITION_MOST: i32 = 1 << 22;
 
@@ -87,9 +90,20 @@ pub fn passes_of(level: usize) -> usize {
     }
 }
 
+/// Sides of an exemplar in texels of a level, rounded.
+pub(super) fn sides_at(exemplar: Size, level: usize) -> [usize; 2] {
+    [exemplar.height, exemplar.width].map(|side| (side + (1 << level) / 2) >> level)
+}
+
+/// Whether repetition may cost at a level.
+fn may_repeat(exemplar: Size, level: usize) -> bool {
+    level + REPETITION_LEVELS >= levels_of(exemplar)
+        && sides_at(exemplar, level).iter().all(|&side| side <= REPETITION_FARTHEST)
+}
+
 /// What repetition is made to cost at a level.
-pub fn repetition_of(level: usize, levels: usize) -> i32 {
-    if level + REPETITION_LEVELS >= levels { REPETITION } else { 0 }
+pub fn repetition_of(level: usize, exemplar: Size) -> i32 {
+    if may_repeat(exemplar, level) { REPETITION } else { 0 }
 }
 
 impl Appearance {
@@ -120,8 +134,7 @@ impl Appearance {
                     basis.dims, basis.shift
                 ));
             }
-            // What repetition reads lies a side away: at fine levels that is many texels.
-            let most = if dims == COARSE_DIMS { REPETITION_MOST } else { 0 };
+            let most = if may_repeat(size, number) { REPETITION_MOST } else { 0 };
             if !(1..=8).contains(&basis.passes) || !(0..=most).contains(&basis.repetition) {
                 return refused(format!(
                     "level {number}: got {} passes and a repetition cost of {}, expected 1 to 8 and 0 to {most}",

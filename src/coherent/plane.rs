@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::coherent::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, dims_of};
+use crate::coherent::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, dims_of, sides_at};
 use crate::coherent::level::{Features, Level};
 use crate::coherent::start::Start;
 use crate::error::{Error, Result};
@@ -27,6 +27,9 @@ const JITTER: u32 = JITTER_ONE / 2;
 
 /// Shorter side from which on the border of an exemplar that does not wrap is kept.
 const LEAST_BORDERED: usize = 8;
+
+/// Places are from minus this to one less than this.
+const PLACES: i64 = 1 << 31;
 
 /// Which of all planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -176,9 +179,17 @@ impl Plane {
     /// is. `y` and `x` are the window's first row and column, negative ones too.
     ///
     /// # Errors
-    /// A jitter above [`JITTER_ONE`], and an output that wraps whose sides are no multiples of [`Plane::period`].
+    /// Places beyond 32 bits, a jitter above [`JITTER_ONE`], and an output that wraps whose sides are no multiples of [`Plane::period`].
     pub fn window(&self, variation: &Variation, y: i64, x: i64, size: Size) -> Result<Vec<u32>> {
         self.check(variation)?;
+        let is_place = |first: i64, side: usize| {
+            first >= -PLACES && i64::try_from(side).is_ok_and(|side| first <= PLACES - side)
+        };
+        if !is_place(y, size.height) || !is_place(x, size.width) {
+            return Err(Error::usage(format!(
+                "got the window of {size} at row {y}, column {x}, expected places from -2^31 to 2^31 - 1"
+            )));
+        }
         let window = Region { y, x, size };
         // The regions that are needed of each level, the finest first.
         let mut regions: Vec<Region> = Vec::with_capacity(self.levels.len());
@@ -253,17 +264,11 @@ impl Plane {
         (self.exemplar.y as u32 + y) * self.tile_width as u32 + self.exemplar.x as u32 + x
     }
 
-    /// Sides of the exemplar in texels of a level.
-    fn sides_at(&self, level: usize) -> [usize; 2] {
-        let Size { height, width } = self.exemplar.size;
-        [height, width].map(|side| (side + (1 << level) / 2) >> level)
-    }
-
     /// Rows and columns that a pass reaches, and those that the first reaches besides.
     fn reach(&self, level: usize) -> [[usize; 2]; 2] {
         match self.levels[level].repetition {
             0 => [REACH, REACH_BEYOND],
-            _ => [self.sides_at(level).map(|side| side + REACH_REPEATING), [0, 0]],
+            _ => [sides_at(self.exemplar.size, level).map(|side| side + REACH_REPEATING), [0, 0]],
         }
     }
 
@@ -278,7 +283,7 @@ impl Plane {
         let Size { height, width } = region.size;
         let Correction { level: appearance, passes, repetition: cost } = &self.levels[level];
         let repeats = *cost > 0;
-        let distance = self.sides_at(level);
+        let distance = sides_at(self.exemplar.size, level);
         let [reach, _] = self.reach(level);
         for pass in 0..*passes {
             // Each pass leaves out what the passes to come do not reach, and what it cannot look around itself.

@@ -131,7 +131,8 @@ mod tests {
                 libm::cos(std::f64::consts::TAU * (down * y + right * x) as f64 / 64.0)
             };
             let scales = bands(&Lightness::new(size, (0..size.texels()).map(value).collect()));
-            let energy = |band: &Band| band.values.iter().map(|value| value.norm_sqr()).sum::<f64>();
+            let energy =
+                |band: &Band| band.values.iter().map(rustfft::num_complex::Complex::norm_sqr).sum::<f64>();
             let energies: Vec<f64> = scales.iter().flatten().map(energy).collect();
             let most = (0..energies.len()).max_by(|&a, &b| energies[a].total_cmp(&energies[b]));
             assert_eq!(most, Some(ORIENTATIONS + direction), "{energies:?}");

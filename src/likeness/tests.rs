@@ -78,7 +78,7 @@ fn square(is_weave: bool, top: i64, left: i64, side: usize) -> Lightness {
     let value = |n: usize| {
         let (y, x) = (top + (n / side) as i64, left + (n % side) as i64);
         if is_weave {
-            let thread = if (y >> 3) + (x >> 3) & 1 == 0 {
+            let thread = if ((y >> 3) + (x >> 3)) & 1 == 0 {
                 sum_around(y, x, [0, 5], 4)
             } else {
                 sum_around(y, x, [5, 0], 5)

@@ -47,7 +47,7 @@ pub(super) fn fit(features: &Features, level: usize, levels: usize) -> Basis {
         })
         .collect();
     let (weights, offset, shift) = in_fixed_point(&exact, &mean);
-    let (passes, repetition) = (passes_of(level), repetition_of(level, levels));
+    let (passes, repetition) = (passes_of(level), repetition_of(level, features.size()));
     Basis { dims, weights, offset, shift, passes, repetition }
 }
 

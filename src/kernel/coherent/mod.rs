@@ -172,10 +172,7 @@ impl<const D: usize> Subpass<'_, D> {
             left = (0..8).map(|n| u32::from(self.is_inside(proposals[n], NEIGHBOURS[n])) << n).sum();
         }
         let around = self.around(positions, at);
-        let sites = match &self.repetition {
-            Some(repetition) => Some(self.sites(repetition, at)),
-            None => None,
-        };
+        let sites = self.repetition.as_ref().map(|repetition| self.sites(repetition, at));
         let mut best = positions[at];
         let mut least = self.cost::<L>(&around, &sites, best);
         left &= !L::same(&candidates, best);

@@ -73,7 +73,11 @@ pub(super) fn judge(
     };
     // A surface without relief has normals without contrast.
     match context.install(|| Ok((judged(0)?, judged(1)?))) {
-        Ok((x, y)) => Ok(Normals::Judged { against: "normals of the real crops, measured".to_owned(), x, y }),
+        Ok((x, y)) => Ok(Normals::Judged {
+            against: "normals of the real crops, measured".to_owned(),
+            x: Box::new(x),
+            y: Box::new(y),
+        }),
         Err(error) => {
             let error: crate::error::Error = error;
             absent(&error.to_string())

@@ -98,9 +98,9 @@ pub enum Normals {
         /// By what they were judged: normals of the real crops.
         against: String,
         /// n_x.
-        x: NormalRows,
+        x: Box<NormalRows>,
         /// n_y.
-        y: NormalRows,
+        y: Box<NormalRows>,
     },
     /// Why they were not.
     Absent {

@@ -21,7 +21,7 @@ const SEED: u32 = 1;
 
 /// A surface that has clusters, and perhaps sources.
 pub(super) enum Subject {
-    Enlarged(Enlarged),
+    Enlarged(Box<Enlarged>),
     Plane { plane: Box<Plane>, variation: Variation, index: Vec<u16>, size: Size },
 }
 
@@ -49,7 +49,7 @@ impl Subject {
                     return Err(Error::missing(format!("{} is not whole yet", path.display()))
                         .hint("run the command that makes it again; it goes on where it stopped"));
                 }
-                Ok((Self::Enlarged(enlarged), model))
+                Ok((Self::Enlarged(Box::new(enlarged)), model))
             }
             (enlarged::KIND, Some(_)) => Err(Error::usage(format!(
                 "{} has a size of its own: --size is for a model, whose plane is endless",

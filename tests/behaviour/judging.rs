@@ -98,9 +98,10 @@ fn judged(material: &Lightness) -> (Judgement, Vec<(&'static str, Judgement)>) {
 
 #[test]
 fn of_every_material_a_held_out_crop_ranks_before_spoilt_ones() {
-    let names = ["mlvq-btf/corduroy", "mlvq-btf/wallpaper", "mlvq-btf/impalla"];
-    let made = [("leather", Some(sample(Kind::Leather))), ("wood", Some(sample(Kind::Wood)))];
-    let materials = made.into_iter().chain(names.map(|name| (name, measured(name))));
+    let names = ["corduroy", "wallpaper", "impalla"].map(|name| format!("mlvq-btf/{name}/binary.btf"));
+    let made = [("leather", Kind::Leather), ("wood", Kind::Wood)];
+    let made = made.map(|(name, kind)| (name.to_owned(), Some(sample(kind))));
+    let materials = made.into_iter().chain(names.map(|name| (name.clone(), measured(&name))));
     for (name, material) in materials.filter_map(|(name, material)| Some((name, material?))) {
         let (held_out, spoilt) = judged(&material);
         for (how, found) in spoilt {

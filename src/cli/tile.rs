@@ -13,8 +13,9 @@ const LITTLE: f64 = 0.5;
 
 #[derive(Args)]
 pub(super) struct TileOptions {
-    /// What to take as the tile: auto (plane up to 256 texels a side, else cut), plane (all), cut (a seamless part), none
-    /// (all, borders do not join), periodic (all, they do) or WIDTHxHEIGHT (a seamless part)
+    /// What to take as the tile: auto (largest up to 256 texels a side, else cut), largest (all if its borders join, else
+    /// the largest seamless part), cut (the part whose seams show least), WIDTHxHEIGHT (a seamless part), plane (all),
+    /// none (all, borders do not join), periodic (all, they do)
     #[arg(long, default_value = "auto")]
     tile: tile::Choice,
     /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx

@@ -26,28 +26,40 @@ fn of(model: &Path, key: &str) -> (Option<String>, Report) {
 }
 
 #[test]
-fn a_small_plane_is_the_tile_as_it_is_and_goes_through_both_methods() {
+fn of_a_small_plane_nearly_all_is_the_tile_and_goes_through_both_methods() {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("m.zarr");
     let told =
         succeed(btf().arg("model").args([&fixture().measurement(), &model]).args(["--clusters", "24"]));
-    assert!(told.contains("56x48 the whole measurement, its borders do not join"), "{told}");
     assert!(!told.contains("of what was measured"), "{told}");
     let (choice, report) = of(&model, "tile");
-    assert_eq!((choice.as_deref(), report.size, report.wraps), (Some("plane"), PLANE, false));
+    // Two thirds of the sides at least: four fifths, rounded down to a multiple of 8.
+    let [height, width] = report.size;
+    assert_eq!((choice.as_deref(), report.wraps), (Some("largest"), true));
+    assert!(height >= PLANE[0] * 2 / 3 && width >= PLANE[1] * 2 / 3, "{report:?}");
     // The same by name, and by no other.
-    for same in [vec![], vec!["--tile", "auto"], vec!["--tile", "plane"]] {
+    for same in [vec![], vec!["--tile", "auto"], vec!["--tile", "largest"]] {
         succeed(&mut tile(&model, &same));
     }
-    for other in ["none", "periodic", "cut", "40x32"] {
+    for other in ["plane", "none", "periodic", "cut", "40x32"] {
         let told = fail(&mut tile(&model, &["--tile", other]), 65);
         // The first setting that differs: that of a cut names its lattice too.
-        assert!(told.contains(if other == "cut" { "lattice was" } else { "tile was" }), "{told}");
+        assert!(told.contains(if other == "cut" { "tile was" } else { "was" }), "{told}");
     }
     for method in ["paper", "coherent"] {
         let big = folder.path().join(method);
         succeed(btf().arg("enlarge").args([&model, &big]).args(["--method", method, "--size", "130x90"]));
     }
+}
+
+#[test]
+fn a_plane_is_taken_whole_where_its_borders_join_or_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("m.zarr");
+    let told = succeed(&mut tile(&model, &["--tile", "plane"]));
+    assert!(told.contains("56x48 the whole measurement, its borders do not join"), "{told}");
+    let (choice, report) = of(&model, "tile");
+    assert_eq!((choice.as_deref(), report.size, report.wraps), (Some("plane"), PLANE, false));
 }
 
 #[test]
@@ -93,7 +105,7 @@ fn of_a_plane_the_lattice_is_told_and_left_to_the_appearance() {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("m.zarr");
     let mut command = btf();
-    command.arg("model").args([&fixture().measurement(), &model]);
+    command.arg("model").args([&fixture().measurement(), &model]).args(["--tile", "plane"]);
     let told = succeed(command.args(["--clusters", "24", "--lattice", "20,0;0,11"]));
     // 40 of 48 rows and 55 of 56 columns are whole cells.
     assert!(told.contains("holds 10 cells of the lattice"), "{told}");

@@ -79,7 +79,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let measurement = Measurement::open(&options.measurement)?;
     let plane = measurement.description().size;
     let choice = options.choice.resolved(plane);
-    range(choice, plane, &Lattice::None)?;
+    range(choice, plane, &Lattice::None, false)?;
     let mut recipe = json!({
         "stage": "tile", "method": METHOD,
         "measurement": measurement.digest(),
@@ -87,7 +87,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         "seed": options.seed,
     });
     // Of other tiles only the report tells the lattice.
-    if choice == Choice::Cut || options.lattice != LatticeChoice::Auto {
+    if matches!(choice, Choice::Cut | Choice::Largest) || options.lattice != LatticeChoice::Auto {
         recipe["lattice"] = options.lattice.to_string().into();
     }
     Ok(Plan {
@@ -100,9 +100,11 @@ pub fn plan(options: &Options) -> Result<Plan> {
     })
 }
 
-/// What to search for a tile; `None` where the whole plane is it.
-fn range(choice: Choice, plane: Size, lattice: &Lattice) -> Result<Option<SearchRange>> {
+/// What to search for a tile of a plane, whose borders may join; `None` where the whole plane is it.
+fn range(choice: Choice, plane: Size, lattice: &Lattice, joins: bool) -> Result<Option<SearchRange>> {
     match choice {
+        Choice::Largest if !joins => Ok(SearchRange::nearly_all(plane, lattice)),
+        Choice::Largest => Ok(None),
         Choice::Plane | Choice::None | Choice::Periodic => Ok(None),
         Choice::Sized(size) => SearchRange::of_size(size, plane).map(Some).map_err(|overlap| {
             Error::usage(format!(
@@ -152,14 +154,14 @@ impl Plan {
     /// The tile, where it was cut, and the lattice of the plane.
     fn tile(&self, features: &Features) -> Result<(Tile, Option<Patch>, Lattice)> {
         let wraps = match self.choice {
-            Choice::Plane => borders_join(features),
+            Choice::Plane | Choice::Largest => borders_join(features),
             choice => choice == Choice::Periodic,
         };
         let lattice = match self.lattice {
             LatticeChoice::Auto => lattice_of(features, wraps)?,
             LatticeChoice::Given(lattice) => lattice,
         };
-        let Some(range) = range(self.choice, features.size, &lattice)? else {
+        let Some(range) = range(self.choice, features.size, &lattice, wraps)? else {
             return Ok((Tile::whole(features.size, wraps), None, lattice));
         };
         let cut = cut(features, search(features, &range, self.seed));

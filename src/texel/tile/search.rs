@@ -34,14 +34,24 @@ impl SearchRange {
     /// greatest side and more: there is a multiple of every period up to the greatest side. Where no such sides are,
     /// the lattice is passed over. Returns `None` where the plane is too small to cut a tile with an overlap from it.
     pub fn for_plane(size: Size, lattice: &Lattice) -> Option<Self> {
-        let side = size.height.min(size.width);
-        let overlap = (side / 8).clamp(6, 48);
+        let overlap = (size.height.min(size.width) / 8).clamp(6, 48);
+        Self::with(size, lattice, overlap, [5, 8])
+    }
+
+    /// The same for tiles that hold nearly all of a plane: of four fifths of its sides and more, with half the overlap.
+    pub fn nearly_all(size: Size, lattice: &Lattice) -> Option<Self> {
+        let overlap = (size.height.min(size.width) / 16).clamp(4, 24);
+        Self::with(size, lattice, overlap, [4, 5])
+    }
+
+    /// Sides from a share of the greatest that an overlap leaves.
+    fn with(size: Size, lattice: &Lattice, overlap: usize, [part, of]: [usize; 2]) -> Option<Self> {
         let greatest = [size.height, size.width].map(|n| n.saturating_sub(overlap).min(LONGEST_SIDE));
         let most = greatest.map(|n| n / MULTIPLE * MULTIPLE);
         if most.iter().any(|&n| n < 2 * overlap || n < 2 * MULTIPLE) {
             return None;
         }
-        let ordinary = most.map(|n| (n * 5 / 8).next_multiple_of(MULTIPLE)..=n);
+        let ordinary = most.map(|n| (n * part / of).next_multiple_of(MULTIPLE)..=n);
         let ordinary = ordinary.map(|range| range.step_by(MULTIPLE).collect::<Vec<_>>());
         let whole = [0, 1].map(|axis| sides_of_cells(lattice, axis, &ordinary[axis], greatest[axis]));
         let sides = if whole.iter().all(|sides| !sides.is_empty()) { whole } else { ordinary };

@@ -114,12 +114,12 @@ impl Enlarge {
         }
         for report in plan.run(context)? {
             tell.line(format!(
-                "{}: {} from seed {}; {} {} written, {} found done",
+                "{}: {} from seed {}; {}: {} written, {} found done",
                 report.output.display(),
                 self.size,
                 report.seed,
-                report.written,
                 report.unit,
+                report.written,
                 report.found
             ));
             tell.line(format!(

@@ -181,7 +181,7 @@ fn threads_kernels_and_shards_change_no_byte() {
         run("parts", &["--shard", shard], "");
     }
     let told = run("parts", &[], "");
-    assert!(told.contains("; 0 blocks of shards written, 6 found done"), "{told}");
+    assert!(told.contains("; blocks of shards: 0 written, 6 found done"), "{told}");
     for name in ["two", "parts"] {
         assert_same(&folder.path().join(name), &folder.path().join("one"));
     }

@@ -79,7 +79,7 @@ struct NormalsOptions {
     robust: bool,
 }
 
-/// Measurement to model: tile, clusters, normals and random field in one go
+/// Measurement to model: tile, clusters, normals, random field and appearance in one go
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

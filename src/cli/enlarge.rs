@@ -40,7 +40,7 @@ pub(super) struct Enlarge {
     model: PathBuf,
     /// The enlarged index to make; with several seeds each has its number in its name
     output: PathBuf,
-    /// Its size, WIDTHxHEIGHT
+    /// Size of the output in texels, WIDTHxHEIGHT
     #[arg(long)]
     size: Size,
     /// How to enlarge
@@ -50,8 +50,9 @@ pub(super) struct Enlarge {
     /// one output for each, the last included
     #[arg(long, default_value = "1", value_parser = seeds)]
     seed: RangeInclusive<u64>,
-    /// Make an output that joins at its own borders. Its sides must be multiples of what an error names if they are
-    /// not: a power of two (coherent, paper), the tile's sides (repeat, tiles), or a part of them (roller, quilt)
+    /// Make an output that joins at its own borders (paper: nearly). Its sides must be multiples of a power of two
+    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); sizes that are not are
+    /// refused, with the nearest that are
     #[arg(long)]
     tileable: bool,
     /// Make only part K of N of the output (not paper, not quilt): N jobs share the work, in any order

@@ -111,7 +111,7 @@ impl Info {
     fn model(&self) -> Result<Vec<Vec<String>>> {
         let model = Model::open(self.path())?;
         let mut rows = vec![row!["kind", model::KIND]];
-        for stage in [Stage::Tile, Stage::Cluster, Stage::Normals, Stage::Fit] {
+        for stage in [Stage::Tile, Stage::Cluster, Stage::Normals, Stage::Fit, Stage::Appearance] {
             let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
             rows.push(row![stage.name(), done]);
         }

@@ -20,8 +20,8 @@ pub(super) struct SceneArgs {
     /// Part to show: x,y,width,height
     #[arg(long, allow_hyphen_values = true)]
     window: Option<Area>,
-    /// Factor on the linear values
-    #[arg(long, default_value_t = 1.0)]
+    /// Factor on the linear values, above 0
+    #[arg(long, default_value_t = 1.0, value_parser = exposure)]
     pub(super) exposure: f64,
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
     #[arg(long, value_enum, default_value = "model")]
@@ -68,4 +68,9 @@ impl SceneArgs {
             window: self.window,
         }
     }
+}
+
+fn exposure(text: &str) -> std::result::Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| format!("expected a number above 0, got {text:?}"))
 }

@@ -58,7 +58,8 @@ pub fn expect_same(path: &Path, found: &Map<String, Value>, recipe: &Value) -> R
 fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
     if let (Value::Object(old), Value::Object(new)) = (old, new) {
         let mut keys: Vec<&String> = old.keys().chain(new.keys()).collect();
-        keys.sort();
+        // What decides about the meaning of the other settings comes first.
+        keys.sort_by_key(|key| (!["stage", "rule", "tile"].contains(&key.as_str()), key.as_str()));
         let entry = |map: &Map<String, Value>, key: &str| map.get(key).cloned().unwrap_or(Value::Null);
         return keys
             .iter()

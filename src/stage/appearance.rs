@@ -60,6 +60,7 @@ impl Plan {
 
     /// Fits the appearance, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<AppearanceReport> {
+        self.model.forget(Stage::Appearance, &self.recipe)?;
         let Some(_lock) = self.model.begin(Stage::Appearance, &self.recipe)? else {
             return self.model.report(Stage::Appearance);
         };

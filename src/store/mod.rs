@@ -266,14 +266,15 @@ impl Store {
     /// The attributes of a store that must exist and be of this kind.
     pub fn expect(&self, kind: &str) -> Result<Map<String, Value>> {
         let found = self.attributes()?.ok_or_else(|| {
-            Error::missing(format!("{}: no store here, expected a {kind}", self.path.display()))
+            Error::missing(format!("{}: no store here, expected {}", self.path.display(), with_article(kind)))
         })?;
         match found.get("kind").and_then(Value::as_str) {
             Some(name) if name == kind => Ok(found),
             name => Err(Error::input(format!(
-                "{}: got a store of kind {}, expected a {kind}",
+                "{}: got a store of kind {}, expected {}",
                 self.path.display(),
-                name.unwrap_or("unknown")
+                name.unwrap_or("unknown"),
+                with_article(kind)
             ))),
         }
     }
@@ -529,4 +530,9 @@ fn write_error(error: &zarrs::array::ArrayError) -> Error {
         failed = failed.hint("free some space and run the same command again");
     }
     failed
+}
+
+/// A kind of store as a sentence names it.
+fn with_article(kind: &str) -> String {
+    if kind == enlarged::KIND { "an enlarged index".to_owned() } else { format!("a {kind}") }
 }

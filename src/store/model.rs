@@ -140,6 +140,24 @@ impl Model {
         Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
     }
 
+    /// Takes back that a stage was done by another recipe, so that it can be run anew. For stages that cost little and
+    /// that no other stage builds on; what was made of them names their digest.
+    ///
+    /// # Errors
+    /// Reading and writing.
+    pub fn forget(&self, stage: Stage, recipe: &Value) -> Result<()> {
+        let _lock = self.store.lock("")?;
+        let mut attributes = self.store.expect(KIND)?;
+        let stages = attributes.get_mut("stages").and_then(Value::as_object_mut);
+        let Some(stages) = stages else { return Ok(()) };
+        let found = stages.get(stage.name()).and_then(|entry| entry.get("digest")).and_then(Value::as_str);
+        if found.is_none() || found == Some(recipe::digest(recipe).as_str()) {
+            return Ok(());
+        }
+        stages.remove(stage.name());
+        self.store.write_group("", attributes)
+    }
+
     /// Whether a stage is done by this recipe, and its arrays are all there.
     ///
     /// # Errors

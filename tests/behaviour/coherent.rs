@@ -62,6 +62,20 @@ fn part(texels: &[u32], width: usize, part: Window) -> Vec<u32> {
 }
 
 #[test]
+fn another_lattice_describes_the_appearance_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("m.zarr");
+    succeed(&mut crate::fixture::model_of(&fixture().measurement(), &model));
+    let describe = |lattice: &str| {
+        succeed(btf().arg("appearance").arg(&model).args(["--lattice", lattice]));
+        Model::open(&model).unwrap().appearance().unwrap()
+    };
+    let (none, ribs) = (describe("none"), describe("0,11.3"));
+    assert_ne!(none, ribs);
+    assert_eq!(describe("none"), none);
+}
+
+#[test]
 fn windows_cut_differently_hold_the_same_texels() {
     let size = Size::new(75, 90);
     let joins = Size::new(64, 96);

@@ -9,7 +9,9 @@ use crate::likeness::copies::LargestCopy;
 use crate::likeness::verdict::{Tally, WINDOW_SIDE, excess_peak};
 use crate::shape::{Size, Window};
 use crate::stage::judge::frontal_pair;
+use crate::stage::tile;
 use crate::store::enlarged::{Enlarged, Method};
+use crate::store::model::Stage;
 
 /// Shares of clusters in common below which rare parts of the material are being lost.
 const LEAST_SHARES: f64 = 0.9;
@@ -19,6 +21,9 @@ const MOST_EXCESS: f64 = 0.15;
 
 /// Share of the window in one unbroken copy above which an enlargement is mostly a copy.
 const MOST_COPY: f64 = 0.25;
+
+/// Share of the measured plane from which on a larger tile gains little.
+const NEARLY_ALL: f64 = 0.6;
 
 /// What the cheap measures say of an enlargement.
 #[derive(Clone, Debug, Serialize)]
@@ -34,12 +39,14 @@ pub struct Verdict {
 }
 
 impl Subject {
-    /// The verdict on an output; none on one that other runs have not finished yet.
+    /// The verdict on an output; none on one that other runs have not finished yet, or that is smaller than the tile:
+    /// the shares of a part are its own.
     pub(super) fn verdict(&self, output: &Enlarged, method: Method) -> Result<Option<Verdict>> {
-        if !output.is_whole() {
+        let window = middle(output.size());
+        let tile = middle(self.tile).size;
+        if !output.is_whole() || window.size.height < tile.height || window.size.width < tile.width {
             return Ok(None);
         }
-        let window = middle(output.size());
         let (index, source) = (output.read(window)?, output.read_source(window)?);
         let tile = self.model.index()?;
         let wraps = self.model.tile()?.wraps;
@@ -56,8 +63,22 @@ impl Subject {
         let whole = picture(self.tile, &tile).part(middle(self.tile));
         let excess_peak = excess_peak(&picture(window.size, &index), &whole);
         let found = tally.verdict();
-        let warnings = warnings(found.shares, excess_peak, found.largest_copy, method);
-        Ok(Some(Verdict { shares: found.shares, excess_peak, largest_copy: found.largest_copy, warnings }))
+        let report: tile::Report = self.model.report(Stage::Tile)?;
+        let [of_tile, of_plane] =
+            [report.size, report.measurement_size].map(|[height, width]| height * width);
+        let more = if of_tile as f64 > NEARLY_ALL * of_plane as f64 {
+            "measure a larger part of the material"
+        } else {
+            "take a larger tile (btf tile --tile WIDTHxHEIGHT, or none for the whole plane)"
+        };
+        let mut verdict = Verdict {
+            shares: found.shares,
+            excess_peak,
+            largest_copy: found.largest_copy,
+            warnings: Vec::new(),
+        };
+        verdict.warnings = verdict.warnings(method, more);
+        Ok(Some(verdict))
     }
 
     /// L* code of each cluster, from the most frontal view under its lowest light, which shows relief. As many as an
@@ -83,27 +104,35 @@ fn middle(plane: Size) -> Window {
     Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
 }
 
-fn warnings(shares: f64, excess_peak: f64, largest_copy: Option<f64>, method: Method) -> Vec<String> {
-    let another = "take --method coherent, which keeps structure";
-    let advise = |coherent: &'static str| if method == Method::Coherent { coherent } else { another };
-    let mut warnings = Vec::new();
-    if shares < LEAST_SHARES {
-        let advice = advise("take a larger tile, or the whole plane (btf tile --tile none)");
-        warnings.push(format!(
-            "only {:.0} % of the clusters' shares are those of the tile, rare ones are being lost: {advice}",
-            100.0 * shares
-        ));
+impl Verdict {
+    /// What is wrong, each with what to do; `more` is how to come by a larger tile.
+    fn warnings(&self, method: Method, more: &str) -> Vec<String> {
+        let coherent = method == Method::Coherent;
+        let advise = |advice: String| if coherent { advice } else { "take --method coherent".to_owned() };
+        let mut warnings = Vec::new();
+        if self.shares < LEAST_SHARES {
+            warnings.push(format!(
+                "only {:.0} % of the clusters' shares are those of the tile, rare ones are being lost: {}",
+                100.0 * self.shares,
+                advise(more.to_owned())
+            ));
+        }
+        if self.excess_peak < -MOST_EXCESS {
+            let advice = "if the material is regular, name its lattice (btf appearance --lattice)";
+            warnings.push(format!(
+                "the tile is more regular by {:.2}: {}",
+                -self.excess_peak,
+                advise(advice.to_owned())
+            ));
+        }
+        let copies = self.largest_copy.is_some_and(|copy| copy > MOST_COPY);
+        if copies || self.excess_peak > MOST_EXCESS {
+            let what =
+                if copies { "a large part is one copy of the tile" } else { "it repeats more than the tile" };
+            warnings.push(format!("{what}: {}", advise(format!("{more}, or take a larger --jitter"))));
+        }
+        warnings
     }
-    if excess_peak < -MOST_EXCESS {
-        let advice = advise("if the material is regular, name its lattice (btf appearance --lattice)");
-        warnings.push(format!("the tile is more regular by {:.2}: {advice}", -excess_peak));
-    }
-    if excess_peak > MOST_EXCESS || largest_copy.is_some_and(|copy| copy > MOST_COPY) {
-        let advice =
-            advise("take a larger tile, or the whole plane (btf tile --tile none), or a larger --jitter");
-        warnings.push(format!("large parts are copies of the tile, repetition will be seen: {advice}"));
-    }
-    warnings
 }
 
 #[cfg(test)]
@@ -112,14 +141,21 @@ mod tests {
 
     #[test]
     fn each_fault_has_its_warning_and_none_is_none() {
-        let of = |shares, peak, copy| warnings(shares, peak, copy, Method::Coherent).len();
-        assert_eq!(of(0.95, 0.0, Some(0.02)), 0);
-        assert_eq!(of(0.85, 0.0, None), 1);
-        assert_eq!(of(0.95, -0.3, None), 1);
-        assert_eq!(of(0.95, 0.3, Some(0.02)), 1);
-        assert_eq!(of(0.95, 0.0, Some(0.5)), 1);
-        assert!(warnings(0.5, 0.0, None, Method::Paper)[0].contains("--method coherent"));
-        assert!(!warnings(0.5, 0.0, None, Method::Coherent)[0].contains("--method"));
+        let of = |shares, excess_peak, largest_copy, method| {
+            Verdict { shares, excess_peak, largest_copy, warnings: Vec::new() }.warnings(method, "more")
+        };
+        let coherent = |shares, peak, copy| of(shares, peak, copy, Method::Coherent);
+        assert!(coherent(0.95, 0.0, Some(0.02)).is_empty());
+        for (shares, peak, copy, told) in [
+            (0.85, 0.0, None, "85 %"),
+            (0.95, -0.3, None, "--lattice"),
+            (0.95, 0.3, Some(0.02), "repeats more"),
+            (0.95, 0.0, Some(0.5), "one copy"),
+        ] {
+            let warnings = coherent(shares, peak, copy);
+            assert!(warnings.len() == 1 && warnings[0].contains(told), "{warnings:?}");
+        }
+        assert!(of(0.5, 0.0, None, Method::Paper)[0].ends_with("take --method coherent"));
     }
 
     #[test]

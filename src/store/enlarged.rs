@@ -21,6 +21,9 @@ pub const SHARD_SIDE: usize = 512;
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
 
+/// Chunks of a shard.
+const SHARD_CHUNKS: usize = (SHARD_SIDE / CHUNK_SIDE).pow(2);
+
 /// Longest side of an index, as of every [`Size`] that is given as text.
 const MOST_SIDE: u64 = 1 << 24;
 
@@ -182,13 +185,13 @@ impl Enlarged {
         Size::new(self.size.height.div_ceil(SHARD_SIDE), self.size.width.div_ceil(SHARD_SIDE))
     }
 
-    /// Whether a shard has been written.
+    /// Whether a shard has been written, and was not cut off since.
     pub fn has_shard(&self, shard_row: usize, shard_column: usize) -> bool {
         let place = [shard_row as u64, shard_column as u64];
         let has = |array: &Option<Array>, place: &[u64]| {
-            array.as_ref().is_none_or(|array| self.store.has_chunk(array, place))
+            array.as_ref().is_none_or(|array| self.store.has_shard(array, place, SHARD_CHUNKS))
         };
-        self.store.has_chunk(&self.index, &place)
+        self.store.has_shard(&self.index, &place, SHARD_CHUNKS)
             && has(&self.source, &place)
             && has(&self.normals, &[place[0], place[1], 0])
     }

@@ -450,6 +450,13 @@ impl Store {
         self.chunk_path(array, indices).is_file()
     }
 
+    /// Whether a shard of so many chunks is there and not cut off: its index is intact, its chunks are not looked at.
+    pub fn has_shard(&self, array: &Array, indices: &[u64], chunks: usize) -> bool {
+        let path = self.chunk_path(array, indices);
+        path.is_file()
+            && std::fs::File::open(path).and_then(|file| shard::has_index(file, chunks)).unwrap_or(false)
+    }
+
     /// Reads a box of an array: offset and extent in each dimension.
     ///
     /// # Errors

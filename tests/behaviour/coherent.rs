@@ -196,6 +196,13 @@ fn threads_kernels_and_shards_change_no_byte() {
     }
     let told = run("parts", &[], "");
     assert!(told.contains("; blocks of shards: 0 written, 6 found done"), "{told}");
+    // A shard that a crash of the machine cut off is not taken for done.
+    for (array, length) in [("index", 100), ("source", 0)] {
+        let shard = folder.path().join("parts").join(array).join("c/0/1");
+        std::fs::OpenOptions::new().write(true).open(shard).unwrap().set_len(length).unwrap();
+        let told = run("parts", &[], "");
+        assert!(told.contains("; blocks of shards: 1 written, 5 found done"), "{told}");
+    }
     for name in ["two", "parts"] {
         assert_same(&folder.path().join(name), &folder.path().join("one"));
     }

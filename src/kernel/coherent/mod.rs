@@ -87,6 +87,7 @@ const BLOCK: usize = 32;
 
 #[inline(always)]
 fn correct<const D: usize, L: Lanes<D>>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
+    let steps = subpass.repetition.as_ref().map(|repetition| subpass.site_steps(repetition));
     for y in (subpass.rows[0]..subpass.rows[1]).step_by(2) {
         let mut first = subpass.columns[0];
         while first < subpass.columns[1] {
@@ -95,7 +96,7 @@ fn correct<const D: usize, L: Lanes<D>>(positions: &mut [u32], subpass: &Subpass
             // Most texels continue all their neighbours already.
             let broken = subpass.broken(positions, at, count);
             for n in (0..count).step_by(2).filter(|&n| broken[n]) {
-                positions[at + n] = subpass.best::<L>(positions, at + n);
+                positions[at + n] = subpass.best::<L>(positions, steps.as_ref(), at + n);
             }
             first += BLOCK;
         }
@@ -157,7 +158,7 @@ impl<const D: usize> Subpass<'_, D> {
     /// The best of the different positions that the texel and its neighbours propose: the one whose four diagonal
     /// neighbours in the exemplar look most like those around the texel.
     #[inline(always)]
-    fn best<L: Lanes<D>>(&self, positions: &[u32], at: usize) -> u32 {
+    fn best<L: Lanes<D>>(&self, positions: &[u32], steps: Option<&SiteSteps>, at: usize) -> u32 {
         let [height, width] = self.sides;
         let spacing = self.spacing as i32;
         let (mut proposals, mut candidates) = ([0; 8], [0; 8]);
@@ -172,7 +173,10 @@ impl<const D: usize> Subpass<'_, D> {
             left = (0..8).map(|n| u32::from(self.is_inside(proposals[n], NEIGHBOURS[n])) << n).sum();
         }
         let around = self.around(positions, at);
-        let sites = self.repetition.as_ref().map(|repetition| self.sites(repetition, at));
+        let sites = match (&self.repetition, steps) {
+            (Some(repetition), Some(steps)) => Some(self.sites(repetition, steps, at)),
+            _ => None,
+        };
         let mut best = positions[at];
         let mut least = self.cost::<L>(&around, &sites, best);
         left &= !L::same(&candidates, best);
@@ -255,20 +259,32 @@ impl<const D: usize> Subpass<'_, D> {
         there
     }
 
+    /// Where the sites one side of the exemplar away lie, and how they continue to the texel.
+    fn site_steps(&self, repetition: &Repetition<'_>) -> SiteSteps {
+        let [rows, columns] = repetition.distance.map(|distance| distance as isize);
+        let mut steps = SiteSteps { places: [0; SITES], rows: [0; SITES], columns: [0; SITES] };
+        for n in 0..SITES {
+            let (sign, aside) = (if n.is_multiple_of(2) { -1 } else { 1 }, (n / 2 % 3) as isize - 1);
+            let [dy, dx] = if n < SITES / 2 { [sign * rows, aside] } else { [aside, sign * columns] };
+            let back =
+                |step: isize, side: usize| (-step * self.spacing as isize).rem_euclid(side as isize) as i32;
+            steps.places[n] = dy * self.width as isize + dx;
+            steps.rows[n] = back(dy, self.sides[0]);
+            steps.columns[n] = back(dx, self.sides[1]);
+        }
+        steps
+    }
+
     /// The positions that sites one side of the exemplar away continue to.
     #[inline(always)]
-    fn sites(&self, repetition: &Repetition<'_>, at: usize) -> Sites {
-        let [rows, columns] = repetition.distance.map(|distance| distance as i32);
+    fn sites(&self, repetition: &Repetition<'_>, steps: &SiteSteps, at: usize) -> Sites {
         let [height, width] = self.sides.map(|side| side as i32);
-        let spacing = self.spacing as i32;
         let mut sites = Sites { rows: [0; SITES], columns: [0; SITES], cost: repetition.cost };
         for n in 0..SITES {
-            let (sign, aside) = (if n.is_multiple_of(2) { -1 } else { 1 }, (n / 2 % 3) as i32 - 1);
-            let [dy, dx] = if n < SITES / 2 { [sign * rows, aside] } else { [aside, sign * columns] };
-            let place = at.wrapping_add_signed(dy as isize * self.width as isize + dx as isize);
-            let [y, x] = unpack(repetition.before[place]);
-            sites.rows[n] = (y - spacing * dy).rem_euclid(height);
-            sites.columns[n] = (x - spacing * dx).rem_euclid(width);
+            let [y, x] = unpack(repetition.before[at.wrapping_add_signed(steps.places[n])]);
+            let (y, x) = (y + steps.rows[n], x + steps.columns[n]);
+            sites.rows[n] = if y < height { y } else { y - height };
+            sites.columns[n] = if x < width { x } else { x - width };
         }
         sites
     }
@@ -288,6 +304,16 @@ impl<const D: usize> Subpass<'_, D> {
         }
         count
     }
+}
+
+/// How to get from a texel to the sites one side of the exemplar away, and from their positions back.
+struct SiteSteps {
+    /// In places of the region.
+    places: [isize; SITES],
+    /// In rows of the exemplar, below its height.
+    rows: [i32; SITES],
+    /// In columns of the exemplar, below its width.
+    columns: [i32; SITES],
 }
 
 /// Rows and columns that sites one side of the exemplar away continue to.

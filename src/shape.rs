@@ -27,6 +27,12 @@ impl Size {
     pub fn window(self) -> Window {
         Window { y: 0, x: 0, size: self }
     }
+
+    /// The window in its middle, as large as `most` where that fits.
+    pub fn middle(self, most: Self) -> Window {
+        let size = Self::new(self.height.min(most.height), self.width.min(most.width));
+        Window { y: (self.height - size.height) / 2, x: (self.width - size.width) / 2, size }
+    }
 }
 
 impl fmt::Display for Size {
@@ -122,5 +128,16 @@ impl FromStr for Area {
             return Err(format!("expected places from -2^31 to 2^31 - 1, got {text:?}"));
         }
         Ok(Self { y, x, size: Size { height: height as usize, width: width as usize } })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_window_lies_in_the_middle() {
+        let window = Size::new(1000, 300).middle(Size::new(512, 512));
+        assert_eq!((window.y, window.x, window.size), (244, 0, Size::new(512, 300)));
     }
 }

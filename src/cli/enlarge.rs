@@ -182,13 +182,13 @@ impl Enlarge {
 
 /// One line on whether an enlargement looks like its tile, and one for each warning.
 fn tell_verdict(verdict: &Verdict, tell: Tell) {
-    let copy = match verdict.largest_copy {
+    let copy = match verdict.counted.largest_copy {
         Some(copy) => format!(", largest unbroken copy {:.1} % of the middle", 100.0 * copy),
         None => String::new(),
     };
     tell.line(format!(
         "likeness  {:.0} % of the clusters' shares as in the tile, repetition {:+.2}{copy}",
-        100.0 * verdict.shares,
+        100.0 * verdict.counted.shares,
         verdict.excess_peak
     ));
     for warning in &verdict.warnings {

@@ -7,7 +7,7 @@ use crate::coherent::level::{Features, Level};
 use crate::coherent::start::Start;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
-use crate::kernel::coherent::{Repetition, Subpass, correct_coarse, correct_fine, unpack};
+use crate::kernel::coherent::{Repetition, Subpass, correct, unpack};
 use crate::lattice::WaveCounts;
 use crate::shape::{Size, Window};
 
@@ -179,7 +179,8 @@ impl Plane {
     /// is. `y` and `x` are the window's first row and column, negative ones too.
     ///
     /// # Errors
-    /// Places beyond 32 bits, a jitter above [`JITTER_ONE`], and an output that wraps whose sides are no multiples of [`Plane::period`].
+    /// Places beyond 32 bits, a jitter above [`JITTER_ONE`], and an output that wraps whose sides are no multiples of
+    /// [`Plane::period`].
     pub fn window(&self, variation: &Variation, y: i64, x: i64, size: Size) -> Result<Vec<u32>> {
         self.check(variation)?;
         let is_place = |first: i64, side: usize| {
@@ -280,61 +281,48 @@ impl Plane {
 
     /// Corrects the positions of a level; those in the halo come out as whatever they do.
     fn correct(&self, level: usize, region: &Region, positions: &mut [u32]) {
+        match &self.levels[level].level {
+            Levelled::Fine(appearance) => self.correct_by(appearance, level, region, positions),
+            Levelled::Coarse(appearance) => self.correct_by(appearance, level, region, positions),
+        }
+    }
+
+    fn correct_by<const D: usize>(
+        &self,
+        appearance: &Level<D>,
+        level: usize,
+        region: &Region,
+        positions: &mut [u32],
+    ) {
         let Size { height, width } = region.size;
-        let Correction { level: appearance, passes, repetition: cost } = &self.levels[level];
-        let repeats = *cost > 0;
+        let Correction { passes, repetition: cost, .. } = self.levels[level];
+        let repeats = cost > 0;
         let distance = sides_at(self.exemplar.size, level);
         let [reach, _] = self.reach(level);
-        for pass in 0..*passes {
+        for pass in 0..passes {
             // Each pass leaves out what the passes to come do not reach, and what it cannot look around itself.
             let margin: [usize; 2] = std::array::from_fn(|axis| {
                 let sites = if repeats { distance[axis] } else { 0 };
                 (pass * reach[axis] + sites).max(2)
             });
             let before = if repeats { positions.to_vec() } else { Vec::new() };
-            let repetition = repeats.then_some(Repetition { before: &before, distance, cost: *cost });
+            let repetition = repeats.then_some(Repetition { before: &before, distance, cost });
             for parity in PARITIES {
                 let first = |place: i64, parity: i64, margin: usize| {
                     margin + ((parity - place - margin as i64) & 1) as usize
                 };
-                let rows = [first(region.y, parity[0], margin[0]), height.saturating_sub(margin[0])];
-                let columns = [first(region.x, parity[1], margin[1]), width.saturating_sub(margin[1])];
-                let sides = [self.exemplar.size.height, self.exemplar.size.width];
-                let crosses_border = level > 0 || self.wraps;
-                match appearance {
-                    Levelled::Fine(level) => {
-                        let appearance = &level.values;
-                        let (stride, spacing) = (level.stride, level.spacing);
-                        let subpass = Subpass {
-                            width,
-                            rows,
-                            columns,
-                            appearance,
-                            stride,
-                            spacing,
-                            sides,
-                            crosses_border,
-                            repetition,
-                        };
-                        correct_fine(self.kernel, positions, subpass);
-                    }
-                    Levelled::Coarse(level) => {
-                        let appearance = &level.values;
-                        let (stride, spacing) = (level.stride, level.spacing);
-                        let subpass = Subpass {
-                            width,
-                            rows,
-                            columns,
-                            appearance,
-                            stride,
-                            spacing,
-                            sides,
-                            crosses_border,
-                            repetition,
-                        };
-                        correct_coarse(self.kernel, positions, subpass);
-                    }
-                }
+                let subpass = Subpass {
+                    width,
+                    rows: [first(region.y, parity[0], margin[0]), height.saturating_sub(margin[0])],
+                    columns: [first(region.x, parity[1], margin[1]), width.saturating_sub(margin[1])],
+                    appearance: &appearance.values,
+                    stride: appearance.stride,
+                    spacing: appearance.spacing,
+                    sides: [self.exemplar.size.height, self.exemplar.size.width],
+                    crosses_border: level > 0 || self.wraps,
+                    repetition,
+                };
+                correct(self.kernel, positions, &subpass);
             }
         }
     }

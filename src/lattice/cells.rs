@@ -128,7 +128,7 @@ pub fn largest_whole_cells(lattice: &Lattice, plane: Size) -> Option<Window> {
     };
     let size = Size::new(best(0, plane.height)?, best(1, plane.width)?);
     wave_counts(lattice, size)?;
-    Some(Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size })
+    Some(plane.middle(size))
 }
 
 #[cfg(test)]

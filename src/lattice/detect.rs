@@ -7,7 +7,7 @@ use super::cells::wave_counts;
 use super::correlation::Autocorrelation;
 use super::peaks::{Peak, SHORTEST, lowest_before, peaks};
 use super::{Lattice, cross, dot, length, reduced, sine};
-use crate::shape::Size;
+use crate::shape::{Size, Window};
 
 /// Least autocorrelation of a peak.
 const LEAST_VALUE: f64 = 0.35;
@@ -101,9 +101,9 @@ fn downward(lattice: Lattice) -> Lattice {
 
 /// The features of the middle part of a plane.
 fn middle(size: Size, part: Size, dims: usize, features: &[f32]) -> Vec<f32> {
-    let (top, left) = ((size.height - part.height) / 2, (size.width - part.width) / 2);
-    let rows = features.chunks_exact(size.width * dims).skip(top).take(part.height);
-    rows.flat_map(|row| &row[left * dims..(left + part.width) * dims]).copied().collect()
+    let Window { y, x, size: part } = size.middle(part);
+    let rows = features.chunks_exact(size.width * dims).skip(y).take(part.height);
+    rows.flat_map(|row| &row[x * dims..(x + part.width) * dims]).copied().collect()
 }
 
 /// A search in one autocorrelation.

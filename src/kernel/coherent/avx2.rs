@@ -4,36 +4,24 @@
 use std::arch::x86_64::*;
 
 use super::lanes::Lanes;
-use super::{Subpass, correct};
+use super::{Subpass, correct_by};
 use crate::kernel::Kernel;
 
 struct Avx2;
 
-/// Corrects positions at a level of four dimensions; `kernel` vouches for the instructions.
-pub(super) fn correct_fine(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, 4>) {
+/// Corrects positions; `kernel` vouches for the instructions.
+pub(super) fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
     debug_assert!(kernel != Kernel::Plain);
     #[target_feature(enable = "avx2")]
-    fn run(positions: &mut [u32], subpass: &Subpass<'_, 4>) {
-        correct::<4, Avx2>(positions, subpass);
+    fn run<const D: usize>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
+        correct_by::<D, Avx2>(positions, subpass);
     }
     // SAFETY: a kernel other than the plain one is only ever constructed after AVX2 was found.
     unsafe { run(positions, subpass) }
 }
 
-/// Corrects positions at a level of eight dimensions; `kernel` vouches for the instructions.
-pub(super) fn correct_coarse(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, 8>) {
-    debug_assert!(kernel != Kernel::Plain);
-    #[target_feature(enable = "avx2")]
-    fn run(positions: &mut [u32], subpass: &Subpass<'_, 8>) {
-        correct::<8, Avx2>(positions, subpass);
-    }
-    // SAFETY: as above.
-    unsafe { run(positions, subpass) }
-}
-
-// Methods of a trait cannot name the instructions that they need; they are inlined into the two above, which do.
-
-impl Lanes<4> for Avx2 {
+// Methods of a trait cannot name the instructions that they need; they are inlined into the one above, which does.
+impl<const D: usize> Lanes<D> for Avx2 {
     #[inline(always)]
     fn same(candidates: &[u32; 8], position: u32) -> u32 {
         // SAFETY: see above.
@@ -41,26 +29,11 @@ impl Lanes<4> for Avx2 {
     }
 
     #[inline(always)]
-    fn difference(around: &[[i16; 4]; 4], there: &[[i8; 4]; 4]) -> i32 {
-        // SAFETY: see above; both arrays have 16 numbers.
-        unsafe { sum(squared(around.as_flattened(), there.as_flattened())) }
-    }
-}
-
-impl Lanes<8> for Avx2 {
-    #[inline(always)]
-    fn same(candidates: &[u32; 8], position: u32) -> u32 {
+    fn difference(around: &[[i16; D]; 4], there: &[[i8; D]; 4]) -> i32 {
+        const { assert!(D.is_multiple_of(4), "dimensions fill vectors of 16 numbers") };
+        let (around, there) = (around.as_flattened().as_chunks().0, there.as_flattened().as_chunks().0);
         // SAFETY: see above.
-        unsafe { same(candidates, position) }
-    }
-
-    #[inline(always)]
-    fn difference(around: &[[i16; 8]; 4], there: &[[i8; 8]; 4]) -> i32 {
-        let (around, there) = (around.as_flattened(), there.as_flattened());
-        // SAFETY: see above; both arrays have 32 numbers.
-        unsafe {
-            sum(_mm256_add_epi32(squared(&around[..16], &there[..16]), squared(&around[16..], &there[16..])))
-        }
+        unsafe { difference(around, there) }
     }
 }
 
@@ -73,26 +46,21 @@ fn same(candidates: &[u32; 8], position: u32) -> u32 {
     _mm256_movemask_ps(_mm256_castsi256_ps(equal)) as u32
 }
 
-/// Squares of 16 differences, two and two added.
-///
-/// # Safety
-/// Both slices hold 16 numbers.
+/// The sum of squared differences, 16 and 16 at a time.
 #[inline]
 #[target_feature(enable = "avx2")]
-unsafe fn squared(around: &[i16], there: &[i8]) -> __m256i {
-    // SAFETY: the caller's promise.
-    let (around, there) =
-        unsafe { (_mm256_loadu_si256(around.as_ptr().cast()), _mm_loadu_si128(there.as_ptr().cast())) };
-    let there = _mm256_cvtepi8_epi16(there);
-    let threefold = _mm256_add_epi16(there, _mm256_add_epi16(there, there));
-    let difference = _mm256_sub_epi16(around, threefold);
-    _mm256_madd_epi16(difference, difference)
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn sum(lanes: __m256i) -> i32 {
-    let halves = _mm_add_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256::<1>(lanes));
+fn difference(around: &[[i16; 16]], there: &[[i8; 16]]) -> i32 {
+    let mut squares = _mm256_setzero_si256();
+    for (around, there) in around.iter().zip(there) {
+        // SAFETY: 16 numbers are read of each.
+        let (around, there) =
+            unsafe { (_mm256_loadu_si256(around.as_ptr().cast()), _mm_loadu_si128(there.as_ptr().cast())) };
+        let there = _mm256_cvtepi8_epi16(there);
+        let threefold = _mm256_add_epi16(there, _mm256_add_epi16(there, there));
+        let difference = _mm256_sub_epi16(around, threefold);
+        squares = _mm256_add_epi32(squares, _mm256_madd_epi16(difference, difference));
+    }
+    let halves = _mm_add_epi32(_mm256_castsi256_si128(squares), _mm256_extracti128_si256::<1>(squares));
     let quarters = _mm_add_epi32(halves, _mm_unpackhi_epi64(halves, halves));
     _mm_cvtsi128_si32(_mm_add_epi32(quarters, _mm_shuffle_epi32::<0b01>(quarters)))
 }

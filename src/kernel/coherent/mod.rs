@@ -64,21 +64,12 @@ const NEIGHBOURS: [[i32; 2]; 8] = [[0, -1], [0, 1], [-1, 0], [-1, -1], [-1, 1], 
 /// Sites that tell of repetition.
 const SITES: usize = 12;
 
-/// Corrects positions at a level of four dimensions.
-pub fn correct_fine(kernel: Kernel, positions: &mut [u32], subpass: Subpass<'_, 4>) {
+/// Corrects positions at a level of `D` dimensions, a multiple of four.
+pub fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
     match kernel {
-        Kernel::Plain => correct::<4, Plain>(positions, &subpass),
+        Kernel::Plain => correct_by::<D, Plain>(positions, subpass),
         #[cfg(target_arch = "x86_64")]
-        _ => avx2::correct_fine(kernel, positions, &subpass),
-    }
-}
-
-/// Corrects positions at a level of eight dimensions.
-pub fn correct_coarse(kernel: Kernel, positions: &mut [u32], subpass: Subpass<'_, 8>) {
-    match kernel {
-        Kernel::Plain => correct::<8, Plain>(positions, &subpass),
-        #[cfg(target_arch = "x86_64")]
-        _ => avx2::correct_coarse(kernel, positions, &subpass),
+        _ => avx2::correct(kernel, positions, subpass),
     }
 }
 
@@ -86,7 +77,7 @@ pub fn correct_coarse(kernel: Kernel, positions: &mut [u32], subpass: Subpass<'_
 const BLOCK: usize = 32;
 
 #[inline(always)]
-fn correct<const D: usize, L: Lanes<D>>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
+fn correct_by<const D: usize, L: Lanes<D>>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
     let steps = subpass.repetition.as_ref().map(|repetition| subpass.site_steps(repetition));
     for y in (subpass.rows[0]..subpass.rows[1]).step_by(2) {
         let mut first = subpass.columns[0];

@@ -6,13 +6,13 @@ use crate::color::{LUMINANCE_WEIGHTS, Transfer, srgb_decode, srgb_encode};
 use crate::error::Result;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
-use crate::shape::{Size, Window};
+use crate::shape::Size;
 use crate::store::measurement::Description;
 use crate::views::{Views, linear, scaled};
 use btfkit_formats::Direction;
 
-/// Side of the window in the middle of the plane that is looked at texel by texel.
-const WINDOW_SIDE: usize = 192;
+/// The window in the middle of the plane that is looked at texel by texel.
+const WINDOW: Size = Size { height: 192, width: 192 };
 
 /// Side of a thumbnail.
 const THUMBNAIL_SIDE: usize = 16;
@@ -170,7 +170,7 @@ pub fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statistics> {
         relative: relative(&images, &description.lights),
         images,
         frontal,
-        window: middle(description.size).size,
+        window: description.size.middle(WINDOW).size,
         frontal_luminance,
         view_means,
     })
@@ -179,12 +179,6 @@ pub fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statistics> {
 /// The view nearest to the surface normal, the first of equals.
 fn frontal_view(views: &[Direction]) -> usize {
     (0..views.len()).min_by(|&a, &b| views[a].theta_rad.total_cmp(&views[b].theta_rad)).unwrap_or(0)
-}
-
-/// The window in the middle of the plane.
-fn middle(size: Size) -> Window {
-    let (height, width) = (size.height.min(WINDOW_SIDE), size.width.min(WINDOW_SIDE));
-    Window { y: (size.height - height) / 2, x: (size.width - width) / 2, size: Size::new(height, width) }
 }
 
 /// Luminance of three channels, the mean of any other number of them.
@@ -240,7 +234,7 @@ fn of_view(source: &dyn Views, view: usize, frontal: bool) -> Result<ViewStatist
     let Size { height, width } = description.size;
     let (lights, channels) = (description.lights.len(), description.n_channels());
     let samples = source.read_view(view, description.size.window())?;
-    let window = middle(description.size);
+    let window = description.size.middle(WINDOW);
     let mut sums = Sums::new(description, samples.sample_type());
     let mut mean = Vec::with_capacity(window.size.texels());
     let mut kept = Vec::new();

@@ -6,8 +6,8 @@ use super::Subject;
 use crate::error::Result;
 use crate::likeness::Lightness;
 use crate::likeness::copies::LargestCopy;
-use crate::likeness::verdict::{Tally, WINDOW_SIDE, excess_peak};
-use crate::shape::{Size, Window};
+use crate::likeness::verdict::{Tally, Verdict as Counted, WINDOW_SIDE, excess_peak};
+use crate::shape::Size;
 use crate::stage::judge::frontal_pair;
 use crate::stage::tile;
 use crate::store::enlarged::{Enlarged, Method};
@@ -28,12 +28,11 @@ const NEARLY_ALL: f64 = 0.6;
 /// What the cheap measures say of an enlargement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
-    /// Shares of clusters that the tile and the window have in common, 0 to 1.
-    pub shares: f64,
+    /// Shares and copies in the window.
+    #[serde(flatten)]
+    pub counted: Counted,
     /// By how much the largest autocorrelation at shifts of 12 texels or more exceeds the tile's.
     pub excess_peak: f64,
-    /// Share of the window in the largest unbroken copy of the tile; absent where sources are not known.
-    pub largest_copy: Option<f64>,
     /// What makes the enlargement look unlike its tile, and what to do about it.
     pub warnings: Vec<String>,
 }
@@ -42,9 +41,10 @@ impl Subject {
     /// The verdict on an output; none on one that other runs have not finished yet, or that is smaller than the tile:
     /// the shares of a part are its own.
     pub(super) fn verdict(&self, output: &Enlarged, method: Method) -> Result<Option<Verdict>> {
-        let window = middle(output.size());
-        let tile = middle(self.tile).size;
-        if !output.is_whole() || window.size.height < tile.height || window.size.width < tile.width {
+        let most = Size::new(WINDOW_SIDE, WINDOW_SIDE);
+        let [window, part] = [output.size(), self.tile].map(|plane| plane.middle(most));
+        let is_smaller = window.size.height < part.size.height || window.size.width < part.size.width;
+        if is_smaller || !output.is_whole() {
             return Ok(None);
         }
         let (index, source) = (output.read(window)?, output.read_source(window)?);
@@ -58,11 +58,11 @@ impl Subject {
         }
         let lightness = self.lightness()?;
         let picture = |size: Size, index: &[u16]| {
-            Lightness::of_codes(size, index.iter().map(|&cluster| lightness[usize::from(cluster)]))
+            let code = |&cluster: &u16| lightness.get(usize::from(cluster)).copied().unwrap_or_default();
+            Lightness::of_codes(size, index.iter().map(code))
         };
-        let whole = picture(self.tile, &tile).part(middle(self.tile));
-        let excess_peak = excess_peak(&picture(window.size, &index), &whole);
-        let found = tally.verdict();
+        let tile = picture(self.tile, &tile).part(part);
+        let excess_peak = excess_peak(&picture(window.size, &index), &tile);
         let report: tile::Report = self.model.report(Stage::Tile)?;
         let [of_tile, of_plane] =
             [report.size, report.measurement_size].map(|[height, width]| height * width);
@@ -71,37 +71,19 @@ impl Subject {
         } else {
             "take a larger tile (btf tile --tile WIDTHxHEIGHT, or none for the whole plane)"
         };
-        let mut verdict = Verdict {
-            shares: found.shares,
-            excess_peak,
-            largest_copy: found.largest_copy,
-            warnings: Vec::new(),
-        };
+        let mut verdict = Verdict { counted: tally.verdict(), excess_peak, warnings: Vec::new() };
         verdict.warnings = verdict.warnings(method, more);
         Ok(Some(verdict))
     }
 
-    /// L* code of each cluster, from the most frontal view under its lowest light, which shows relief. As many as an
-    /// index can name, so that none leads astray.
+    /// L* code of each cluster, from the most frontal view under its lowest light, which shows relief.
     fn lightness(&self) -> Result<Vec<u8>> {
         let [views, lights] = self.model.directions()?;
         let [view, light] = frontal_pair(&views, &lights)?;
         let brdf = views.len() * lights.len();
-        let mut codes = vec![0; usize::from(u16::MAX) + 1];
-        let centres = self.model.centres()?;
-        for (code, &centre) in
-            codes.iter_mut().zip(centres.iter().skip(view * lights.len() + light).step_by(brdf))
-        {
-            *code = centre;
-        }
-        Ok(codes)
+        let first = view * lights.len() + light;
+        Ok(self.model.centres()?.into_iter().skip(first).step_by(brdf).collect())
     }
-}
-
-/// The window in the middle of a plane, of at most [`WINDOW_SIDE`] texels a side.
-fn middle(plane: Size) -> Window {
-    let size = Size::new(plane.height.min(WINDOW_SIDE), plane.width.min(WINDOW_SIDE));
-    Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
 }
 
 impl Verdict {
@@ -110,10 +92,10 @@ impl Verdict {
         let coherent = method == Method::Coherent;
         let advise = |advice: String| if coherent { advice } else { "take --method coherent".to_owned() };
         let mut warnings = Vec::new();
-        if self.shares < LEAST_SHARES {
+        if self.counted.shares < LEAST_SHARES {
             warnings.push(format!(
                 "only {:.0} % of the clusters' shares are those of the tile, rare ones are being lost: {}",
-                100.0 * self.shares,
+                100.0 * self.counted.shares,
                 advise(more.to_owned())
             ));
         }
@@ -125,7 +107,7 @@ impl Verdict {
                 advise(advice.to_owned())
             ));
         }
-        let copies = self.largest_copy.is_some_and(|copy| copy > MOST_COPY);
+        let copies = self.counted.largest_copy.is_some_and(|copy| copy > MOST_COPY);
         if copies || self.excess_peak > MOST_EXCESS {
             let what =
                 if copies { "a large part is one copy of the tile" } else { "it repeats more than the tile" };
@@ -142,7 +124,8 @@ mod tests {
     #[test]
     fn each_fault_has_its_warning_and_none_is_none() {
         let of = |shares, excess_peak, largest_copy, method| {
-            Verdict { shares, excess_peak, largest_copy, warnings: Vec::new() }.warnings(method, "more")
+            let counted = Counted { shares, largest_copy };
+            Verdict { counted, excess_peak, warnings: Vec::new() }.warnings(method, "more")
         };
         let coherent = |shares, peak, copy| of(shares, peak, copy, Method::Coherent);
         assert!(coherent(0.95, 0.0, Some(0.02)).is_empty());
@@ -156,11 +139,5 @@ mod tests {
             assert!(warnings.len() == 1 && warnings[0].contains(told), "{warnings:?}");
         }
         assert!(of(0.5, 0.0, None, Method::Paper)[0].ends_with("take --method coherent"));
-    }
-
-    #[test]
-    fn the_window_lies_in_the_middle() {
-        let window = middle(Size::new(1000, 300));
-        assert_eq!((window.y, window.x, window.size), (244, 0, Size::new(512, 300)));
     }
 }

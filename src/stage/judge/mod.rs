@@ -293,15 +293,9 @@ fn lattice_peak(found: &[Found]) -> Option<LatticePeak> {
     (!peaks.is_empty()).then(|| LatticePeak { enlarged: mean(0), own: mean(1) })
 }
 
-/// The window in the middle of a plane, of at most so many texels a side.
-fn middle(plane: Size, most: usize) -> Window {
-    let size = Size::new(plane.height.min(most), plane.width.min(most));
-    Window { y: (plane.height - size.height) / 2, x: (plane.width - size.width) / 2, size }
-}
-
 /// Wavy bands in a window in the middle.
 fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Option<f64>; 2]> {
-    let window = middle(subject.size(), WAVY_SIDE);
+    let window = subject.size().middle(Size::new(WAVY_SIDE, WAVY_SIDE));
     let texels = subject.texels(window, material.clusters, material.tile)?;
     let values = match texels.source {
         Some(source) => source.iter().map(|&texel| codes.tile[texel as usize]).collect::<Vec<_>>(),

@@ -28,6 +28,7 @@ pub mod random;
 pub mod run;
 pub mod sample;
 pub mod shape;
+mod signal;
 pub mod stage;
 pub mod store;
 pub mod texel;

@@ -1,16 +1,16 @@
 //! The autocorrelation of a plane of features, by the Fourier transform.
 
-use std::sync::Arc;
-
-use rayon::prelude::*;
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlannerScalar};
 
-use super::smooth::{gaussian, transposed, wide_mean};
 use crate::shape::Size;
+use crate::signal::fourier::Fourier;
+use crate::signal::smooth::{gaussian, wide_mean};
 
 /// Standard deviation of the blur of the features, texels.
 const BLUR: f64 = 1.0;
+
+/// Standard deviations after which the blur is cut off.
+const CUT: f64 = 4.0;
 
 /// Standard deviation of the mean that is taken away where a plane does not wrap, parts of a side.
 const WIDE: f64 = 1.0 / 6.0;
@@ -45,9 +45,10 @@ impl Autocorrelation {
             .map(|side| if wraps { side / 2 } else { (side as f64 * REACH) as usize } as isize);
         let padded =
             |side: usize, reach: isize| if wraps { side } else { smooth_number(side + reach as usize + 1) };
-        let transform = Transform::new(Size::new(padded(height, reach[0]), padded(width, reach[1])));
+        let whole = Size::new(padded(height, reach[0]), padded(width, reach[1]));
+        let fourier = Fourier::new(whole);
         let mut energy = vec![0.0; size.texels()];
-        let mut power = vec![0.0; transform.size.texels()];
+        let mut power = vec![Complex::new(0.0, 0.0); whole.texels()];
         for first in (0..dims).step_by(2) {
             let plane = |dim: usize| prepared(size, features.iter().skip(dim).step_by(dims), wraps);
             let real = plane(first);
@@ -56,20 +57,24 @@ impl Autocorrelation {
                 *energy += a * a + b * b;
             }
             // The real part of the autocorrelation of a + i b is the sum of those of a and of b.
-            for (power, value) in power.iter_mut().zip(transform.forward(size, &real, &imaginary)) {
-                *power += value.norm_sqr();
+            let mut rows = Vec::with_capacity(height * whole.width);
+            for (real, imaginary) in real.chunks_exact(width).zip(imaginary.chunks_exact(width)) {
+                rows.extend(real.iter().zip(imaginary).map(|(&re, &im)| Complex::new(re, im)));
+                rows.resize(rows.len() + whole.width - width, Complex::new(0.0, 0.0));
+            }
+            for (power, value) in power.iter_mut().zip(fourier.forward(rows)) {
+                power.re += value.norm_sqr();
             }
         }
         let all: f64 = energy.iter().sum();
         if !(all.is_finite() && all > 0.0) {
             return None;
         }
-        let sums = transform.inverse(&power);
+        let sums = fourier.inverse(&power);
         let energies = Energies::of(size, &energy);
         let value = |dy: isize, dx: isize| {
-            let (y, x) =
-                (dy.rem_euclid(transform.size.height as isize), dx.rem_euclid(transform.size.width as isize));
-            let sum = sums[y as usize * transform.size.width + x as usize];
+            let (y, x) = (dy.rem_euclid(whole.height as isize), dx.rem_euclid(whole.width as isize));
+            let sum = sums[y as usize * whole.width + x as usize].re;
             let scale = if wraps { all } else { energies.overlapping(dy, dx) };
             if scale > 0.0 { (sum / scale).clamp(-1.0, 1.0) } else { 0.0 }
         };
@@ -113,7 +118,7 @@ fn prepared<'a>(size: Size, values: impl Iterator<Item = &'a f32>, wraps: bool) 
         let wide = wide_mean(&plane, size, WIDE);
         plane.iter_mut().zip(&wide).for_each(|(value, wide)| *value -= wide);
     }
-    gaussian(&plane, size, BLUR, wraps)
+    gaussian(&plane, size, [BLUR; 2], CUT, wraps)
 }
 
 /// The least number of at least `least` that has no prime factor but 2, 3 and 5, of which transforms are fast.
@@ -127,64 +132,6 @@ fn smooth_number(least: usize) -> usize {
         n == 1
     };
     (least..).find(|&n| smooth(n)).unwrap_or(least)
-}
-
-/// Transforms of planes of one size, by a planner that takes the same steps on every machine.
-struct Transform {
-    size: Size,
-    /// Along rows and along columns.
-    forward: [Arc<dyn Fft<f64>>; 2],
-    inverse: [Arc<dyn Fft<f64>>; 2],
-}
-
-type Values = Vec<Complex<f64>>;
-
-impl Transform {
-    fn new(size: Size) -> Self {
-        let mut planner = FftPlannerScalar::new();
-        let sides = [size.width, size.height];
-        let forward = sides.map(|side| planner.plan_fft_forward(side));
-        Self { size, forward, inverse: sides.map(|side| planner.plan_fft_inverse(side)) }
-    }
-
-    /// The spectrum, transposed, of a plane that is followed by zeros.
-    fn forward(&self, plane: Size, real: &[f64], imaginary: &[f64]) -> Values {
-        let zero = Complex::new(0.0, 0.0);
-        let mut values = vec![zero; plane.height * self.size.width];
-        let rows = real.chunks_exact(plane.width).zip(imaginary.chunks_exact(plane.width));
-        for (to, (real, imaginary)) in values.chunks_exact_mut(self.size.width).zip(rows) {
-            for (to, (&re, &im)) in to.iter_mut().zip(real.iter().zip(imaginary)) {
-                *to = Complex::new(re, im);
-            }
-        }
-        lines(&mut values, &*self.forward[0]);
-        let columns = transposed(&values, self.size.width);
-        let mut values = vec![zero; self.size.texels()];
-        for (to, column) in values.chunks_exact_mut(self.size.height).zip(columns.chunks_exact(plane.height))
-        {
-            to[..plane.height].copy_from_slice(column);
-        }
-        lines(&mut values, &*self.forward[1]);
-        values
-    }
-
-    /// The real part of the plane of a real, transposed spectrum.
-    fn inverse(&self, power: &[f64]) -> Vec<f64> {
-        let mut values: Values = power.iter().map(|&value| Complex::new(value, 0.0)).collect();
-        lines(&mut values, &*self.inverse[1]);
-        let mut values = transposed(&values, self.size.height);
-        lines(&mut values, &*self.inverse[0]);
-        let texels = self.size.texels() as f64;
-        values.into_iter().map(|value| value.re / texels).collect()
-    }
-}
-
-/// Transforms every line of a matrix.
-fn lines(values: &mut [Complex<f64>], transform: &dyn Fft<f64>) {
-    let scratch = || vec![Complex::new(0.0, 0.0); transform.get_inplace_scratch_len()];
-    values
-        .par_chunks_exact_mut(transform.len())
-        .for_each_init(scratch, |scratch, line| transform.process_with_scratch(line, scratch));
 }
 
 /// Sums of the energy of rectangles of a plane.

@@ -9,7 +9,6 @@ mod correlation;
 pub mod detect;
 mod given;
 mod peaks;
-mod smooth;
 #[cfg(test)]
 mod tests;
 

@@ -3,8 +3,8 @@
 use rustfft::num_complex::Complex;
 
 use super::Lightness;
-use super::fourier::Fourier;
 use crate::shape::Size;
+use crate::signal::fourier::Fourier;
 
 /// Shifts of at least so many texels down or across are far: not the texture's own grain.
 pub const FAR: usize = 12;
@@ -15,9 +15,9 @@ pub fn far_peak(picture: &Lightness) -> f64 {
     let Size { height, width } = picture.size;
     let mean = picture.mean();
     let fourier = Fourier::new(picture.size);
-    let mut spectrum = fourier.forward(picture.values.iter().map(|value| value - mean));
+    let mut spectrum = fourier.forward_real(picture.values.iter().map(|value| value - mean));
     spectrum.iter_mut().for_each(|value| *value = Complex::new(value.norm_sqr(), 0.0));
-    let correlations = fourier.inverse(spectrum);
+    let correlations = fourier.inverse(&spectrum);
     let energy = correlations.first().map_or(0.0, |value| value.re);
     let far = |n: usize| {
         let (y, x) = (n / width, n % width);

@@ -13,7 +13,6 @@ pub mod bands;
 pub mod co_occurrence;
 pub mod copies;
 mod draws;
-mod fourier;
 mod judge;
 mod lightness;
 pub mod patches;

@@ -3,9 +3,13 @@
 
 use super::{Lightness, correlation, mean};
 use crate::shape::Size;
+use crate::signal::smooth::gaussian;
 
 /// Shifts within so many texels of the exemplar's side are looked at.
 const SLACK: usize = 2;
+
+/// Standard deviations after which a blur is cut off.
+const CUT: f64 = 3.0;
 
 /// The means of the rows and of the columns of a plane of codes that comes row by row.
 #[derive(Clone, Debug)]
@@ -70,33 +74,8 @@ fn shifts(side: usize, length: usize) -> Option<std::ops::RangeInclusive<usize>>
 }
 
 /// A picture under a Gaussian of two standard deviations, down and across, mirrored at its borders.
-fn blurred(picture: &Lightness, [down, across]: [f64; 2]) -> Lightness {
-    let Size { height, width } = picture.size;
-    let rows: Vec<f64> = picture.values.chunks_exact(width).flat_map(|row| smoothed(row, across)).collect();
-    let mut values = vec![0.0; rows.len()];
-    for x in 0..width {
-        let column: Vec<f64> = rows[x..].iter().step_by(width).copied().collect();
-        for (y, value) in smoothed(&column, down).into_iter().enumerate() {
-            values[y * width + x] = value;
-        }
-    }
-    Lightness::new(Size::new(height, width), values)
-}
-
-/// A line under a Gaussian, cut off after three standard deviations.
-fn smoothed(line: &[f64], deviation: f64) -> Vec<f64> {
-    let radius = (3.0 * deviation).ceil() as i64;
-    let weights: Vec<f64> =
-        (-radius..=radius).map(|n| libm::exp(-0.5 * libm::pow(n as f64 / deviation, 2.0))).collect();
-    let sum: f64 = weights.iter().sum();
-    let length = line.len() as i64;
-    let mirrored = |n: i64| {
-        let n = n.rem_euclid(2 * length);
-        line[(if n < length { n } else { 2 * length - 1 - n }) as usize]
-    };
-    let extended: Vec<f64> = (-radius..length + radius).map(mirrored).collect();
-    let value = |around: &[f64]| around.iter().zip(&weights).map(|(a, b)| a * b).sum::<f64>() / sum;
-    extended.windows(weights.len()).map(value).collect()
+fn blurred(picture: &Lightness, deviations: [f64; 2]) -> Lightness {
+    Lightness::new(picture.size, gaussian(&picture.values, picture.size, deviations, CUT, false))
 }
 
 #[cfg(test)]

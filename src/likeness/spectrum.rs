@@ -2,7 +2,7 @@
 
 use super::Lightness;
 use super::bands::root_mean_square;
-use super::fourier::{Fourier, frequency};
+use crate::signal::fourier::{Fourier, frequency};
 
 /// Rings, of equal breadth in octaves from 2 cycles a side to half the sampling rate.
 const RINGS: usize = 12;
@@ -24,7 +24,7 @@ pub fn spectrum(picture: &Lightness) -> Vec<f64> {
         let (down, across) = (down[y], &across);
         row.iter().zip(across).map(move |(value, across)| (value - mean) * down * across)
     });
-    let power = Fourier::new(picture.size).forward(windowed);
+    let power = Fourier::new(picture.size).forward_real(windowed);
     let half = (height.min(width) / 2) as f64;
     let mut sums = [(0.0, 0u64); RINGS * DIRECTIONS];
     for (n, value) in power.iter().enumerate() {

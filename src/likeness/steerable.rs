@@ -5,8 +5,8 @@
 use rustfft::num_complex::Complex;
 
 use super::Lightness;
-use super::fourier::{Fourier, frequency};
 use crate::shape::Size;
+use crate::signal::fourier::{Fourier, frequency};
 
 /// Number of scales, an octave each.
 pub(super) const SCALES: usize = 4;
@@ -34,7 +34,7 @@ struct Low {
 pub(super) fn bands(picture: &Lightness) -> Vec<Vec<Band>> {
     let full = picture.size;
     let polar = Polar { full };
-    let mut low = Low { size: full, values: Fourier::new(full).forward(picture.values.iter().copied()) };
+    let mut low = Low { size: full, values: Fourier::new(full).forward_real(picture.values.iter().copied()) };
     low.keep_below(&polar, 0.0);
     let mut scales = Vec::with_capacity(SCALES);
     for scale in 1..=SCALES {
@@ -53,7 +53,7 @@ pub(super) fn bands(picture: &Lightness) -> Vec<Vec<Band>> {
                 // (-i)^3 = i makes the filters' impulse responses real and odd before they are made complex.
                 Complex::new(0.0, window) * value
             };
-            Band { size: low.size, values: fourier.inverse(octave.iter().map(value).collect()) }
+            Band { size: low.size, values: fourier.inverse(&octave.iter().map(value).collect::<Vec<_>>()) }
         };
         scales.push((0..ORIENTATIONS).map(band).collect());
         low = low.halved();

@@ -203,6 +203,7 @@ impl Plan<'_> {
             return Err(Error::input(problems.join("\n"))
                 .hint("replace these images, delete the unfinished store and import again"));
         }
+        measurement.finish()?;
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
 }

@@ -112,7 +112,7 @@ impl Passes {
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's lie there.
     pub fn create(path: &Path, recipe: &Value) -> Result<Self> {
-        let store = Store::at(path);
+        let mut store = Store::at(path);
         store.begin_by_recipe(KIND, recipe, json!({}))?;
         Ok(Self { store })
     }

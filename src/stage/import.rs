@@ -116,6 +116,7 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
         "views": degrees(&description.views),
         "lights": degrees(&description.lights),
         "images": source.check(context)?,
+        "reading": source.reading(),
         "transfer": description.transfer,
         "white": options.white,
         "codec": options.codec.name(),

@@ -8,6 +8,7 @@ pub mod units;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
+use crate::store::output::Existing;
 use progress::Progress;
 
 /// What every stage is given besides its options.
@@ -20,6 +21,8 @@ pub struct Context<'a> {
     pub threads: usize,
     /// Resident memory that the work may use.
     pub memory_bytes: u64,
+    /// What to do about what lies where a result is to be.
+    pub existing: Existing,
     pool: rayon::ThreadPool,
 }
 
@@ -36,7 +39,13 @@ impl<'a> Context<'a> {
             .num_threads(threads)
             .build()
             .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
-        Ok(Self { progress, stop, threads, memory_bytes, pool })
+        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+    }
+
+    /// The same, with results that take the place of what is there.
+    #[must_use]
+    pub fn with_existing(self, existing: Existing) -> Self {
+        Self { existing, ..self }
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.

@@ -8,11 +8,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
+use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::store::checksums::DIGITS;
 use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::{NARROW, Stage, is_unit};
-use crate::store::{Array, DAMAGED, Layout, Named, Store};
+use crate::store::{Array, DAMAGED, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
@@ -116,6 +117,8 @@ pub struct Enlarged {
     index: Array,
     source: Option<Array>,
     normals: Option<Array>,
+    /// Of one that is being written.
+    _lock: Option<Lock>,
 }
 
 /// What an enlarged index is, for its attributes.
@@ -148,21 +151,28 @@ impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
     ///
     /// `model` is the model's place; its name is kept, to find it beside the result.
-    pub fn create(path: &Path, description: &Description, recipe: &Value, model: &Path) -> Result<Self> {
+    pub fn create(
+        path: &Path,
+        description: &Description,
+        recipe: &Value,
+        model: &Path,
+        context: &Context<'_>,
+    ) -> Result<Self> {
         let mut store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
         let Description { size, clusters, tile, keep_source, keep_normals } = *description;
         let more = json!({
             "model_name": model_name, "clusters": clusters, "tile": [tile.height, tile.width],
         });
-        store.begin_by_recipe(KIND, recipe, more)?;
+        let lock = store.begin_by_recipe(KIND, recipe, more, context)?;
         let facts = Facts::read(&store)?;
         let index = store.create_array("index", &index_layout(size, clusters > NARROW))?;
         let source =
             keep_source.then(|| store.create_array("source", &source_layout(size, tile))).transpose()?;
         let normals =
             keep_normals.then(|| store.create_array("normals", &normals_layout(size))).transpose()?;
-        Ok(Self { store, facts, size, wide: clusters > NARROW, index, source, normals })
+        let wide = clusters > NARROW;
+        Ok(Self { store, facts, size, wide, index, source, normals, _lock: Some(lock) })
     }
 
     /// Opens an enlarged index for reading.
@@ -198,7 +208,7 @@ impl Enlarged {
         };
         let normals =
             recipe.keep_normals.then(|| store.open_array("normals", &normals_layout(size))).transpose()?;
-        Ok(Self { store, facts, size, wide, index, source, normals })
+        Ok(Self { store, facts, size, wide, index, source, normals, _lock: None })
     }
 
     /// Declares it finished, if all shards are there: its root then holds checksums, and the metadata of all arrays for
@@ -206,7 +216,7 @@ impl Enlarged {
     ///
     /// # Errors
     /// Those of reading and writing, and where a shard's index is damaged.
-    pub fn finish(&self) -> Result<()> {
+    pub fn finish(&self, context: &Context<'_>) -> Result<()> {
         if !self.is_whole() {
             return Ok(());
         }
@@ -214,7 +224,7 @@ impl Enlarged {
             .arrays()
             .map(|array| Ok((array.name().to_owned(), json!(self.store.checksums(array)?))))
             .collect::<Result<_>>()?;
-        let _lock = self.store.lock("")?;
+        let _lock = self.store.lock("", context)?;
         let mut attributes = self.store.expect(KIND)?;
         attributes.insert(CHECKSUMS.to_owned(), Value::Object(sums));
         let names: Vec<String> = self.arrays().map(|array| array.name().to_owned()).collect();
@@ -338,20 +348,26 @@ impl Enlarged {
             && has(&self.normals, &[place[0], place[1], 0])
     }
 
-    /// Number of shards that have been written. Only those that lie on the disk are looked at, whatever size is claimed.
-    pub fn shards_done(&self) -> usize {
+    /// Rows and columns of the shards of the index that lie on the disk, in order: whatever size is claimed, no others are
+    /// looked for.
+    pub fn shards_found(&self) -> Vec<[usize; 2]> {
         let Size { height, width } = self.shards();
         let listed = |folder: &Path, end: usize| -> Vec<usize> {
             let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
             let numbers = entries.filter_map(|entry| entry.file_name().to_string_lossy().parse().ok());
-            numbers.filter(|&number| number < end).collect()
+            let mut numbers: Vec<usize> = numbers.filter(|&number| number < end).collect();
+            numbers.sort_unstable();
+            numbers
         };
         let folder = self.store.path().join("index").join("c");
-        let of_row = |row: usize| {
-            let columns = listed(&folder.join(row.to_string()), width);
-            columns.into_iter().filter(|&column| self.has_shard(row, column)).count()
-        };
-        listed(&folder, height).into_iter().map(of_row).sum()
+        let of_row =
+            |row: usize| listed(&folder.join(row.to_string()), width).into_iter().map(move |c| [row, c]);
+        listed(&folder, height).into_iter().flat_map(of_row).collect()
+    }
+
+    /// Number of shards that have been written.
+    pub fn shards_done(&self) -> usize {
+        self.shards_found().into_iter().filter(|&[row, column]| self.has_shard(row, column)).count()
     }
 
     /// Whether all shards have been written.

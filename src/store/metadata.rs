@@ -95,7 +95,7 @@ pub fn seal(attributes: &Map<String, Value>) -> String {
 ///
 /// # Errors
 /// Says what was found and expected.
-pub(super) fn check_ours(ours: &Map<String, Value>, is_root: bool) -> std::result::Result<(), String> {
+pub(crate) fn check_ours(ours: &Map<String, Value>, is_root: bool) -> std::result::Result<(), String> {
     let mut needs_seal = false;
     if is_root {
         match ours.get("format").and_then(Value::as_u64) {
@@ -121,7 +121,7 @@ pub(super) fn check_ours(ours: &Map<String, Value>, is_root: bool) -> std::resul
 }
 
 /// Checks that `digest` is that of `recipe`, where there is one.
-pub(super) fn check_digest(entry: &Map<String, Value>) -> std::result::Result<(), String> {
+pub(crate) fn check_digest(entry: &Map<String, Value>) -> std::result::Result<(), String> {
     let Some(recipe) = entry.get("recipe") else {
         return if entry.contains_key("digest") {
             Err("a digest without a recipe".to_owned())

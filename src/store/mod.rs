@@ -32,17 +32,21 @@ use serde_json::{Map, Value, json};
 use zarrs::array::DataType;
 
 use crate::error::{Error, Result};
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 pub use array::{Array, Layout, Named};
 pub use codec::Chain;
 pub use lock::Lock;
 pub(crate) use lock::is_lock;
 use mapped::MappedStorage;
 pub use metadata::FORMAT;
+use output::Existing;
 pub(crate) use read::DAMAGED;
 
 /// Level of the zstd codec: after level 1 measured data hardly packs better, only slower.
 const ZSTD_LEVEL: i32 = 1;
+
+/// Name of the lock that whoever writes a store by a recipe shares with others who do.
+const WRITING: &str = "-writing";
 
 /// The Zarr data type of samples.
 fn data_type_of(sample_type: SampleType) -> DataType {
@@ -104,8 +108,8 @@ impl Store {
     }
 
     /// Waits until no other process holds the lock `name` of this store.
-    pub fn lock(&self, name: &str) -> Result<Lock> {
-        Lock::wait(&self.path, name)
+    pub fn lock(&self, name: &str, context: &Context<'_>) -> Result<Lock> {
+        Lock::wait(&self.path, name, context)
     }
 
     /// Whether all chunks (or shards) of an array are there.
@@ -166,10 +170,15 @@ impl Store {
     ///
     /// # Errors
     /// Where there is something else.
-    pub fn begin(&mut self, kind: &str, attributes: Map<String, Value>) -> Result<Map<String, Value>> {
-        // Looked at before the lock, which leaves a file: none in a folder that is not ours.
+    pub fn begin(
+        &mut self,
+        kind: &str,
+        attributes: Map<String, Value>,
+        context: &Context<'_>,
+    ) -> Result<Map<String, Value>> {
+        // Looked at before the lock, which makes a file: none in a folder that is not ours.
         self.expect_ours_or_nothing()?;
-        let _lock = self.lock("")?;
+        let _lock = self.lock("", context)?;
         self.expect_ours_or_nothing()?;
         if self.attributes()?.is_none() {
             let own = [
@@ -186,20 +195,67 @@ impl Store {
     }
 
     /// Begins a store of this kind, or goes on with the one that the same recipe began; `more` are
-    /// attributes beside the recipe.
+    /// attributes beside the recipe. Where results may be replaced, another recipe's store of the same kind is removed.
+    ///
+    /// Returns a lock that keeps others from removing this one; it is to be held while the store is written.
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's store lies there.
-    pub fn begin_by_recipe(&mut self, kind: &str, recipe: &Value, more: Value) -> Result<()> {
+    pub fn begin_by_recipe(
+        &mut self,
+        kind: &str,
+        recipe: &Value,
+        more: Value,
+        context: &Context<'_>,
+    ) -> Result<Lock> {
+        mapped::Temporary::sweep_beside(&self.path);
+        if context.existing == Existing::Replace {
+            self.remove_another(kind, recipe, context)?;
+        }
         let mut attributes = Map::new();
         attributes.insert("recipe".to_owned(), recipe.clone());
         attributes.insert("digest".to_owned(), json!(recipe::digest(recipe)));
         if let Value::Object(more) = more {
             attributes.extend(more);
         }
-        let found = self.begin(kind, attributes)?;
+        let found = self.begin(kind, attributes, context)?;
         recipe::expect_same(&self.path, &found, recipe)?;
-        self.sweep()
+        let lock = Lock::share(&self.path, WRITING, context)?;
+        // It may have been removed between.
+        recipe::expect_same(&self.path, &self.expect(kind)?, recipe)?;
+        self.sweep()?;
+        Ok(lock)
+    }
+
+    /// Removes another recipe's store of this kind, or a damaged one, once nobody writes it any more.
+    fn remove_another(&self, kind: &str, recipe: &Value, context: &Context<'_>) -> Result<()> {
+        let is_another = || -> Result<bool> {
+            match self.attributes() {
+                Ok(None) => Ok(false),
+                Ok(Some(_)) => Ok(recipe::expect_same(&self.path, &self.expect(kind)?, recipe).is_err()),
+                Err(_) if self.claimed_kind().as_deref() == Some(kind) => Ok(true),
+                Err(error) => Err(error),
+            }
+        };
+        if !is_another()? {
+            return Ok(());
+        }
+        let _lock = self.lock(WRITING, context)?;
+        if !is_another()? {
+            return Ok(());
+        }
+        // Moved away first: at no time is there a store with a part of its shards that looks like an unfinished one.
+        let old = mapped::temporary_name(&self.path);
+        let failed = |error| Error::io("remove", &self.path, error);
+        std::fs::rename(&self.path, &old).map_err(failed)?;
+        std::fs::remove_dir_all(&old).map_err(failed)
+    }
+
+    /// The kind that a root names, however damaged its other attributes are.
+    fn claimed_kind(&self) -> Option<String> {
+        let document = metadata::read_object(&self.metadata_path("")).ok()??;
+        let kind = document.get("attributes")?.get("btfkit")?.get("kind")?;
+        kind.as_str().map(str::to_owned)
     }
 
     fn expect_ours_or_nothing(&self) -> Result<()> {
@@ -284,6 +340,17 @@ impl Store {
             return Ok(());
         }
         mapped::write_file(&file, &text)
+    }
+
+    /// Removes an array; nothing where there is none.
+    pub(crate) fn remove(&self, name: &str) -> Result<()> {
+        let path = self.path.join(name);
+        match std::fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io("remove", &path, error))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether a chunk (or shard) has been written.

@@ -15,12 +15,13 @@ use crate::coherent::Appearance;
 use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
 use crate::mrf::Surface;
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 use crate::shape::Size;
 use crate::store::appearance::{self, AppearanceReport};
 use crate::store::checksums::DIGITS;
 use crate::store::field::{self, FieldReport};
 use crate::store::measurement::Description;
+use crate::store::output::Existing;
 use crate::store::tile_report::TileReport;
 use crate::store::{
     Array, DAMAGED, Layout, Lock, Named, SAMPLE_TYPES, Store, data_type_of, directions, metadata,
@@ -67,6 +68,16 @@ impl Stage {
     /// All of them, in the order of the data flow.
     pub const ALL: [Self; 5] = [Self::Tile, Self::Cluster, Self::Normals, Self::Fit, Self::Appearance];
 
+    /// The stages that build on it, directly or not, in the order of the data flow.
+    fn builders(self) -> &'static [Self] {
+        match self {
+            Self::Tile => &[Self::Cluster, Self::Normals, Self::Fit, Self::Appearance],
+            Self::Cluster => &[Self::Appearance],
+            Self::Normals => &[Self::Fit],
+            Self::Fit | Self::Appearance => &[],
+        }
+    }
+
     /// The stage that it works on the result of, and the member of its recipe that names that one's digest.
     pub fn input(self) -> Option<(Self, &'static str)> {
         match self {
@@ -96,6 +107,11 @@ struct ClusterFacts {
     clusters: usize,
 }
 
+/// Name of the lock of a stage.
+fn lock_name(stage: Stage) -> String {
+    format!("-{}", stage.name())
+}
+
 /// A model store.
 pub struct Model {
     store: Store,
@@ -103,11 +119,11 @@ pub struct Model {
 
 impl Model {
     /// Opens a model, or begins one where there is none.
-    pub fn create(path: &Path) -> Result<Self> {
+    pub fn create(path: &Path, context: &Context<'_>) -> Result<Self> {
         let mut store = Store::at(path);
         let mut attributes = Map::new();
         attributes.insert("stages".to_owned(), json!({}));
-        store.begin(KIND, attributes)?;
+        store.begin(KIND, attributes, context)?;
         store.sweep()?;
         Ok(Self { store })
     }
@@ -192,32 +208,67 @@ impl Model {
     }
 
     /// Begins a stage and holds it against other processes; none where it is done by this recipe and
-    /// its arrays are all there.
+    /// its arrays are all there. Where results may be replaced, what another recipe made is taken back first, and with
+    /// it every stage that builds on it.
     ///
     /// # Errors
     /// Where it has been run by another recipe.
-    pub fn begin(&self, stage: Stage, recipe: &Value) -> Result<Option<Lock>> {
-        let lock = self.store.lock(&format!("-{}", stage.name()))?;
+    pub fn begin(&self, stage: Stage, recipe: &Value, context: &Context<'_>) -> Result<Option<Lock>> {
+        let lock = self.store.lock(&lock_name(stage), context)?;
         self.store.sweep()?;
-        Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
+        if context.existing == Existing::Replace {
+            self.take_back(stage, recipe, context)?;
+        }
+        if !self.is_done(stage, recipe)? {
+            return Ok(Some(lock));
+        }
+        // Another program may have changed an array's attributes since.
+        if !self.is_consolidated().unwrap_or(true) {
+            let _lock = self.store.lock("", context)?;
+            self.write_root(self.store.expect(KIND)?)?;
+        }
+        Ok(None)
     }
 
-    /// Takes back that a stage was done by another recipe, so that it can be run anew. For stages that cost little and
-    /// that no other stage builds on; what was made of them names their digest.
-    ///
-    /// # Errors
-    /// Reading and writing.
-    pub fn forget(&self, stage: Stage, recipe: &Value) -> Result<()> {
-        let _lock = self.store.lock("")?;
-        let mut attributes = self.store.expect(KIND)?;
-        let stages = attributes.get_mut("stages").and_then(Value::as_object_mut);
-        let Some(stages) = stages else { return Ok(()) };
-        let found = stages.get(stage.name()).and_then(|entry| entry.get("digest")).and_then(Value::as_str);
-        if found.is_none() || found == Some(recipe::digest(recipe).as_str()) {
-            return Ok(());
+    /// Takes back a stage that another recipe made, and those that build on it: their entries first, then their arrays.
+    fn take_back(&self, stage: Stage, recipe: &Value, context: &Context<'_>) -> Result<()> {
+        match self.entry(stage)? {
+            Some(entry) if entry.digest != recipe::digest(recipe) => {}
+            _ => return Ok(()),
         }
-        stages.remove(stage.name());
-        self.write_root(attributes)
+        // In the order of the data flow, as everybody takes them.
+        let _later: Vec<Lock> = stage
+            .builders()
+            .iter()
+            .map(|&stage| self.store.lock(&lock_name(stage), context))
+            .collect::<Result<_>>()?;
+        let mut arrays = Vec::new();
+        {
+            let _lock = self.store.lock("", context)?;
+            let mut attributes = self.store.expect(KIND)?;
+            let stages = attributes.get_mut("stages").and_then(Value::as_object_mut);
+            let Some(stages) = stages else { return Ok(()) };
+            for taken in stage.builders().iter().chain([&stage]) {
+                if let Some(entry) = stages.remove(taken.name()) {
+                    let report = entry.get("report").cloned().unwrap_or_default();
+                    let of_stage = self.arrays(*taken, &report).unwrap_or_default();
+                    arrays.extend(of_stage.into_iter().map(|(name, _)| name));
+                    if *taken != stage {
+                        context.progress.notice(&format!(
+                            "{}: stage {} built on what is made anew: run it again (btf {}, or btf model)",
+                            self.path().display(),
+                            taken.name(),
+                            taken.name()
+                        ));
+                    }
+                }
+            }
+            self.write_root(attributes)?;
+        }
+        for array in arrays {
+            self.store.remove(&array)?;
+        }
+        Ok(())
     }
 
     /// Whether a stage is done by this recipe, and its arrays are all there.
@@ -242,7 +293,13 @@ impl Model {
     }
 
     /// Declares a stage done; to be called after its arrays are written.
-    pub fn finish(&self, stage: Stage, recipe: &Value, report: &impl Serialize) -> Result<()> {
+    pub fn finish(
+        &self,
+        stage: Stage,
+        recipe: &Value,
+        report: &impl Serialize,
+        context: &Context<'_>,
+    ) -> Result<()> {
         let failed = |error: serde_json::Error| Error::internal(error.to_string());
         let report = serde_json::to_value(report).map_err(failed)?;
         let checksum = |(name, layout): (String, Layout<'_>)| {
@@ -253,7 +310,7 @@ impl Model {
         let digest = recipe::digest(recipe);
         let entry = Entry { recipe: recipe.clone(), digest, report, checksums: Some(checksums) };
         // Another stage may be writing its own entry.
-        let _lock = self.store.lock("")?;
+        let _lock = self.store.lock("", context)?;
         let mut attributes = self.store.expect(KIND)?;
         if let Some(stages) = attributes.get_mut("stages").and_then(Value::as_object_mut) {
             stages.insert(stage.name().to_owned(), serde_json::to_value(entry).map_err(failed)?);

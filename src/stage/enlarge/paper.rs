@@ -98,7 +98,8 @@ impl Paper {
             keep_source: false,
             keep_normals,
         };
-        let store = Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model)?;
+        let store =
+            Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model, context)?;
         let state = EnlargeState::read(&output.path, &digest)?;
         let shard_rows = store.shards().height;
         let found = match &state {

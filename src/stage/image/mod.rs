@@ -12,6 +12,7 @@ use crate::run::progress::Counted;
 use crate::shape::{Area, Size, Window};
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
+use crate::store::output::Made;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
@@ -76,11 +77,11 @@ pub struct PlaneOptions {
 }
 
 /// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
-/// with its width only. Returns its size.
+/// with its width only. Returns its size, and whether it was there already.
 ///
 /// # Errors
 /// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
-pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<Size> {
+pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<(Size, Made)> {
     Ending::of(output)?;
     let mut scene = Scene::open(options, context)?;
     scene.expose(exposure);
@@ -90,7 +91,7 @@ pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_
     let mut bands = scene.bands(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let mut band: Option<(usize, usize, Band<'_>)> = None;
-    stream::write(output, size, scene.meaning(), |pixels| {
+    let made = stream::write(output, size, scene.meaning(), context.existing, |pixels| {
         let (next, rows, read) = match band.take() {
             Some(band) if band.0 < band.1 => band,
             _ => {
@@ -105,7 +106,7 @@ pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_
         Ok(())
     })?;
     context.progress.end();
-    Ok(size)
+    Ok((size, made))
 }
 
 /// The measurement itself, mixed between measured directions.

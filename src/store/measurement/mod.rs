@@ -20,11 +20,11 @@ use btfkit_formats::{SampleType, Samples};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 use crate::shape::{Size, Window};
 use crate::store::checksums::DIGITS;
 use crate::store::codec::{Chain, chunk_codecs};
-use crate::store::{Array, Layout, Named, Store, directions};
+use crate::store::{Array, Layout, Lock, Named, Store, directions};
 use crate::views::Views;
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
@@ -56,6 +56,8 @@ pub struct Measurement {
     codec: Chain,
     reflectance: Array,
     luminance: Array,
+    /// Of one that is being written.
+    _lock: Option<Lock>,
 }
 
 impl Measurement {
@@ -63,8 +65,14 @@ impl Measurement {
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
-    pub fn create(path: &Path, description: Description, codec: Chain, origin: &Origin<'_>) -> Result<Self> {
-        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES)
+    pub fn create(
+        path: &Path,
+        description: Description,
+        codec: Chain,
+        origin: &Origin<'_>,
+        context: &Context<'_>,
+    ) -> Result<Self> {
+        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES, context)
     }
 
     fn create_in_shards(
@@ -73,11 +81,12 @@ impl Measurement {
         codec: Chain,
         origin: &Origin<'_>,
         limit_bytes: usize,
+        context: &Context<'_>,
     ) -> Result<Self> {
         let recipe = origin.recipe;
         let mut store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
-        store.begin_by_recipe(
+        let lock = store.begin_by_recipe(
             KIND,
             recipe,
             json!({
@@ -85,6 +94,7 @@ impl Measurement {
                 "channels": description.channels, "samples": description.sample_type.name(),
                 "assumptions": origin.assumptions, "remarks": origin.remarks,
             }),
+            context,
         )?;
         directions::write(&store, "view", &description.views)?;
         directions::write(&store, "light", &description.lights)?;
@@ -93,7 +103,7 @@ impl Measurement {
             store.create_array("reflectance", &reflectance_layout(&description, codec, side)?)?;
         let luminance = store.create_array("luminance", &luminance_layout(&description, codec, side)?)?;
         let digest = recipe::digest(recipe);
-        Ok(Self { store, description, digest, side, codec, reflectance, luminance })
+        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: Some(lock) })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
@@ -142,7 +152,7 @@ impl Measurement {
         let reflectance = store.check_document("reflectance", &layout, &document)?;
         let luminance = store.open_array("luminance", &luminance_layout(&description, codec, side)?)?;
         let digest = facts.digest;
-        Ok(Self { store, description, digest, side, codec, reflectance, luminance })
+        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: None })
     }
 
     /// Declares the measurement finished, if all views are there: its root then holds checksums, and the metadata of all
@@ -150,7 +160,7 @@ impl Measurement {
     ///
     /// # Errors
     /// Those of reading and writing, and where a shard's index is damaged.
-    pub fn finish(&self) -> Result<()> {
+    pub fn finish(&self, context: &Context<'_>) -> Result<()> {
         if self.views_done() < self.description.views.len() {
             return Ok(());
         }
@@ -158,7 +168,7 @@ impl Measurement {
             "reflectance": self.store.checksums(&self.reflectance)?,
             "luminance": self.store.checksums(&self.luminance)?,
         });
-        let _lock = self.store.lock("")?;
+        let _lock = self.store.lock("", context)?;
         let mut attributes = self.store.expect(KIND)?;
         attributes.insert(CHECKSUMS.to_owned(), checksums);
         self.store.write_finished(attributes, &self.arrays())
@@ -190,6 +200,15 @@ impl Measurement {
             }
         }
         Ok(None)
+    }
+
+    /// Checks that the coordinates by which other programs select are the directions.
+    ///
+    /// # Errors
+    /// Where they are not.
+    pub fn check_coordinates(&self) -> Result<()> {
+        directions::check_coordinates(&self.store, "view", &self.description.views)?;
+        directions::check_coordinates(&self.store, "light", &self.description.lights)
     }
 
     /// Whether the root holds the metadata of all arrays as they are.
@@ -419,6 +438,8 @@ mod tests {
             (Size::new(37, 50), 16 * 16 * 15 * 4, 16, SampleType::F32),
         ] {
             let folder = tempfile::tempdir().unwrap();
+            let stop = std::sync::atomic::AtomicBool::new(false);
+            let context = Context::new(&crate::run::progress::Silent, &stop, 1, 1 << 30).unwrap();
             let recipe = json!({"size": size.to_string()});
             let origin = Origin { recipe: &recipe, assumptions: &[], remarks: &[] };
             let description = description(size, sample_type);
@@ -428,6 +449,7 @@ mod tests {
                 Chain::Stock,
                 &origin,
                 limit,
+                &context,
             )
             .unwrap();
             assert_eq!(measurement.side, side);

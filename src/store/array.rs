@@ -294,8 +294,7 @@ impl Store {
 }
 
 /// What to do about metadata that are not those that were written.
-const REMADE: &str = "the command that makes this store writes this file anew where it makes the array: delete the \
-                      array's folder and run it again";
+const REMADE: &str = "run the command that makes this store again: it writes this file anew";
 
 /// The first difference of a document from what it must be. Attributes beside the expected ones are free; names of
 /// dimensions count where `strict` is given.

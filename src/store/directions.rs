@@ -77,7 +77,10 @@ pub(super) fn write(store: &Store, dimension: &str, directions: &[Direction]) ->
 /// None, too many, or any that is not finite or lies below the plane.
 pub(super) fn read(store: &Store, dimension: &str) -> Result<Vec<Direction>> {
     let name = format!("{dimension}_direction");
-    let refused = |what: String| Error::input(format!("{}: {name}: {what}", store.path().display()));
+    let refused = |what: String| {
+        Error::input(format!("{}: {name}: {what}", store.path().display()))
+            .hint("run the command that makes this store again: it writes the directions anew")
+    };
     let count = store.claimed_shape(&name, 2)?[0];
     if !(1..=MOST).contains(&count) {
         return Err(refused(format!("got {count} directions, expected 1 to {MOST}")));

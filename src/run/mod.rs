@@ -2,12 +2,13 @@
 //! progress, and stopping on request.
 
 pub mod progress;
+pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::store::output::Existing;
 use progress::Progress;
 
@@ -57,4 +58,20 @@ impl<'a> Context<'a> {
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
+}
+
+/// Starts a thread of a scope.
+///
+/// # Errors
+/// [`Kind::Io`] where the system starts none.
+fn spawn<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
+    started.map(|_| ()).map_err(|error| {
+        Error::new(Kind::Io, format!("cannot start the thread \"{name}\": {error}"))
+            .hint("allow more processes or memory, or fewer --threads")
+    })
 }

@@ -7,7 +7,7 @@ use std::sync::mpsc::sync_channel;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::run::Context;
+use crate::run::{Context, budget};
 use crate::store::measurement::Measurement;
 use crate::texel::cluster::points::Arrangement;
 use crate::texel::cluster::selection::{Block, Selection};
@@ -56,7 +56,7 @@ impl<'a> Stream<'a> {
         // One block is handed over while the next is read; the channel itself holds none.
         let (sender, receiver) = sync_channel(0);
         std::thread::scope(|scope| {
-            scope.spawn(move || {
+            let started = std::thread::Builder::new().spawn_scoped(scope, move || {
                 for number in absent {
                     let block = &selection.blocks()[number];
                     let vectors = context
@@ -69,6 +69,7 @@ impl<'a> Stream<'a> {
                     }
                 }
             });
+            started.map_err(|error| budget::cannot_start(1, &error))?;
             for number in blocks {
                 context.check_stop()?;
                 let block = &selection.blocks()[number];

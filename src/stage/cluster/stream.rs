@@ -39,7 +39,8 @@ impl<'a> Stream<'a> {
     pub(super) fn bytes_in_flight(selection: &Selection, arrangement: &Arrangement) -> usize {
         let texels = selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(0);
         let window = selection.blocks().iter().map(|block| block.window.size.texels()).max().unwrap_or(0);
-        read_ahead::IN_FLIGHT * texels * arrangement.stride() + window * arrangement.cosines().len() * arrangement.lights()
+        read_ahead::IN_FLIGHT * texels * arrangement.stride()
+            + window * arrangement.cosines().len() * arrangement.lights()
     }
 
     /// Calls `work` with each block of `blocks` and its vectors [slot, stride], in their order, on the pool.

@@ -77,7 +77,7 @@ impl Verify {
         let store = self.store.display();
         if !report.damaged.is_empty() {
             let error = Error::input(format!("{store}: {} damaged chunks", report.damaged.len()));
-            return Err(error.hint("delete the files named and import again: only their views are read"));
+            return Err(error.hint("if the archive is still there, move the files named away and import again: only their views are read"));
         }
         match report.different {
             Some(count) if count > 0 => {

@@ -28,7 +28,7 @@ use zarrs::array::{
     ElementOwned, FillValue, data_type,
 };
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Kind, Result, advice};
 use crate::run::{Context, recipe};
 pub use codec::Chain;
 use codec::Codecs;
@@ -36,6 +36,7 @@ pub use lock::Lock;
 pub(crate) use lock::is_lock;
 use mapped::MappedStorage;
 use output::Existing;
+use zarrs_storage::StorageError;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
 pub const FORMAT: u64 = 1;
@@ -393,8 +394,15 @@ impl Store {
 
     /// Opens an array for reading.
     pub fn open_array(&self, name: &str) -> Result<Array> {
-        if !self.path.join(name).join("zarr.json").exists() {
-            return Err(Error::missing(format!("{}: no array {name} in this store", self.path.display())));
+        let file = self.path.join(name).join("zarr.json");
+        match readable(&file) {
+            Err(error) if error.kind() == Kind::Missing => {
+                return Err(Error::missing(format!(
+                    "{}: no array {name} in this store",
+                    self.path.display()
+                )));
+            }
+            other => other?,
         }
         Array::open(self.storage.clone(), &format!("/{name}")).map_err(|error| self.damaged(name, &error))
     }
@@ -552,6 +560,14 @@ impl Store {
         if let Some(chunks) = chunks {
             for indices in &chunks.indices() {
                 if !self.has_chunk(array, &indices) {
+                    // There, but not to be looked at, perhaps.
+                    let path = self.chunk_path(array, &indices);
+                    match std::fs::metadata(&path) {
+                        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                            return Err(Error::io("read", &path, error));
+                        }
+                        _ => {}
+                    }
                     return Err(Error::missing(format!(
                         "{}: {name}: shard {indices:?} has not been written",
                         self.path.display()
@@ -560,9 +576,16 @@ impl Store {
                 }
             }
         }
-        array
-            .retrieve_array_subset_opt::<Vec<T>>(&subset, &CodecOptions::default())
-            .map_err(|error| self.damaged(&name, &error))
+        array.retrieve_array_subset_opt::<Vec<T>>(&subset, &CodecOptions::default()).map_err(|error| {
+            // What may not be read is not damaged.
+            let chunks = array.chunks_in_array_subset(&subset).ok().flatten();
+            let refused = chunks.and_then(|chunks| {
+                let indices = chunks.indices();
+                let mut paths = indices.iter().map(|indices| self.chunk_path(array, &indices));
+                paths.find_map(|path| readable(&path).err())
+            });
+            refused.unwrap_or_else(|| self.damaged(&name, &error))
+        })
     }
 
     /// Reads a whole array whose shape must be `shape` (0 stands for any extent); returns the shape found.
@@ -583,17 +606,31 @@ impl Store {
 
     fn damaged(&self, name: &str, error: &dyn std::fmt::Display) -> Error {
         Error::input(format!("{}: array {name}: {error}", self.path.display())).hint(
-            "the store is damaged: delete what the message names and run the command that made it again",
+            "the store is damaged: if what it was made of is still there, move what the message names away and run the command              that made it again",
         )
     }
 }
 
+/// An error of writing through zarrs; the storage has put the path and the system's own words into it.
 fn write_error(error: &zarrs::array::ArrayError) -> Error {
-    let mut failed = Error::new(Kind::Io, error.to_string());
-    if error.to_string().contains("No space left") {
-        failed = failed.hint("free some space and run the same command again");
+    use zarrs::array::{ArrayError, CodecError};
+    let refused = match error {
+        ArrayError::StorageError(StorageError::IOError(refused))
+        | ArrayError::CodecError(
+            CodecError::IOError(refused) | CodecError::StorageError(StorageError::IOError(refused)),
+        ) => Some(refused),
+        _ => None,
+    };
+    let failed = Error::new(Kind::Io, error.to_string());
+    match refused.and_then(|refused| advice(refused, false)) {
+        Some(advice) => failed.hint(advice),
+        None => failed,
     }
-    failed
+}
+
+/// Checks that a file can be opened.
+fn readable(path: &Path) -> Result<()> {
+    std::fs::File::open(path).map(|_| ()).map_err(|error| Error::io("read", path, error))
 }
 
 /// A kind of store as a sentence names it.

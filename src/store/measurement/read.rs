@@ -19,6 +19,10 @@ struct Shard {
     chunks: Vec<Option<Range<usize>>>,
 }
 
+/// What to do about a shard that is damaged. Its other chunks may be all that is left of what they show.
+const DAMAGED: &str = "the store is damaged: if the archive is still there, move this file away and import again, which reads only \
+                       its view; if not, keep it: its other chunks can still be read";
+
 impl Measurement {
     /// Samples of a window under one view, [y, x, light, channel].
     ///
@@ -109,7 +113,7 @@ impl Measurement {
                 y / CHUNK_SIDE * CHUNK_SIDE,
                 x / CHUNK_SIDE * CHUNK_SIDE
             ))
-            .hint("the store is damaged: delete this file and run the command that made it again")
+            .hint(DAMAGED)
         };
         let place = [y / self.side, x / self.side];
         let shard = shards.iter().find(|(at, _)| *at == place).map(|(_, shard)| shard);
@@ -143,10 +147,8 @@ impl Measurement {
                     }
                     _ => Error::io("read", &path, error),
                 })?;
-                let chunks = shard::chunk_ranges(file.as_ref(), across * across).map_err(|what| {
-                    Error::input(format!("{}: {what}", path.display()))
-                        .hint("the store is damaged: delete this file and run the command that made it again")
-                })?;
+                let chunks = shard::chunk_ranges(file.as_ref(), across * across)
+                    .map_err(|what| Error::input(format!("{}: {what}", path.display())).hint(DAMAGED))?;
                 Ok(([sy, sx], Shard { file, chunks }))
             })
             .collect()

@@ -1,6 +1,6 @@
 //! What `--memory` allows: the program's own share, what a stage needs at least, and what the system leaves.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
 pub const OWN_BYTES: u64 = 12 << 20;
@@ -20,7 +20,7 @@ pub fn require(what: &str, needed: u64, allowed: u64) -> Result<()> {
 
 /// The error of threads that the system does not start.
 pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
-    Error::internal(format!("cannot start {threads} threads: {error}"))
+    Error::new(Kind::Io, format!("cannot start {threads} threads: {error}"))
         .hint("choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)")
 }
 

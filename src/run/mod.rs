@@ -3,6 +3,7 @@
 
 pub mod budget;
 pub mod progress;
+pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
@@ -95,4 +96,17 @@ impl<'a> Context<'a> {
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
+}
+
+/// Starts a thread of a scope.
+///
+/// # Errors
+/// [`Kind::Io`] where the system starts none.
+fn spawn<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
+    started.map(|_| ()).map_err(|error| budget::cannot_start(1, &error))
 }

@@ -8,7 +8,9 @@ mod cascade;
 mod page;
 mod place;
 pub mod pyramid;
+mod verify;
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,15 +21,16 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::picture;
-use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
+use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
 use crate::store::mapped::write_file;
 use cascade::{Cascade, Sink};
 use place::Place;
 use pyramid::Pyramid;
+pub(crate) use verify::verify;
 
 /// Sides of a tile that are allowed.
 pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
@@ -176,7 +179,7 @@ impl Plan {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
         let left = context.memory_bytes.saturating_sub(needed);
-        let bands = self.scene.bands(left).map_err(|_| {
+        let (in_flight, bands) = self.scene.bands_in_flight(left).map_err(|_| {
             Error::usage(format!(
                 "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
                 window.size.width,
@@ -192,17 +195,17 @@ impl Plan {
         if !self.is_whole() {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
             let mut pixels = vec![[0.0; 3]; window.size.width];
-            for rows in bands {
-                context.check_stop()?;
-                let band = self.scene.read(rows.clone(), context)?;
-                for row in 0..rows.len() {
+            let read = |rows: Range<usize>| Ok((rows.len(), self.scene.read(rows, context)?));
+            read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
+                (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
-                    cascade.push(&self.pyramid, &pixels, &tiles)?;
-                }
-            }
+                    cascade.push(&self.pyramid, &pixels, &tiles)
+                })
+            })?;
         } else {
             tiles.found.store(total, Ordering::Relaxed);
         }
+        self.keep_checksums()?;
         self.place
             .write_beside(&self.place.page, &page::viewer(&self.pyramid, self.encoding, &self.place.name)?)?;
         self.place.write_beside(&self.place.description, &page::description(&self.pyramid, self.encoding))?;
@@ -214,6 +217,14 @@ impl Plan {
             tiles_found: found,
             tiles_written: total - found,
         })
+    }
+
+    /// Keeps the checksums of all tiles beside the recipe, by which exchanged ones are found.
+    fn keep_checksums(&self) -> Result<()> {
+        let mut state = self.place.state()?.unwrap_or_default();
+        let checksums = verify::checksums(&self.pyramid, &self.place)?;
+        state.insert(verify::CHECKSUMS.to_owned(), json!(checksums));
+        self.place.write_state(state)
     }
 
     /// Whether every tile is there.

@@ -13,8 +13,8 @@ use btfkit_formats::{SampleType, Samples};
 use crate::archive::adapt::half;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
 use crate::store::output::Made;
@@ -114,13 +114,17 @@ fn for_each_view(
 ) -> Result<()> {
     let description = measurement.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
-    for view in 0..description.views.len() {
-        context.check_stop()?;
+    // Read as texels, then turned.
+    let in_flight = read_ahead::in_flight(context.memory_bytes, 2 * description.view_bytes());
+    let read = |view| {
         let texels = measurement.read_reflectance(view, description.size.window())?;
-        each(view, images_of_texels(&texels, description.lights.len(), description.n_channels()))?;
+        Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))
+    };
+    read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, images)| {
+        each(view, images)?;
         context.progress.advance(1);
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Linear samples: halves for 8 bits, which are told apart by them, and for halves; floats for the others.

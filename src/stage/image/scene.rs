@@ -15,7 +15,7 @@ use crate::color::Decoder;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::picture::{Meaning, Picture, false_color};
-use crate::run::Context;
+use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::Store;
@@ -107,12 +107,7 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
-        let attributes = Store::at(path).attributes()?.ok_or_else(|| {
-            Error::missing(format!(
-                "{}: no store here, expected a measurement, a model or an enlarged index",
-                path.display()
-            ))
-        })?;
+        let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
         let digest = attributes.get("digest").cloned().unwrap_or_default();
         let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
         if options.plane.is_some() && kind != model::KIND {
@@ -237,17 +232,20 @@ impl Scene {
         Ok(Band { width, pixels })
     }
 
-    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed`
-    /// bytes do not hold more.
+    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed_bytes` do not
+    /// hold more, and how many of them fit at a time.
     ///
     /// # Errors
     /// Where not even a row fits.
-    pub fn bands(&self, allowed_bytes: u64) -> Result<impl Iterator<Item = Range<usize>> + use<>> {
+    pub fn bands_in_flight(
+        &self,
+        allowed_bytes: u64,
+    ) -> Result<(usize, impl Iterator<Item = Range<usize>> + Send + use<>)> {
         let Size { height, width } = self.area.size;
         let row_bytes = (width * self.texel_bytes()) as u64;
-        let fitting = |&rows: &usize| rows as u64 * row_bytes <= allowed_bytes;
-        let rows = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
-        let rows = rows.into_iter().find(fitting).ok_or_else(|| {
+        let sizes = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
+        let fitting = sizes.into_iter().find(|&rows| rows as u64 * row_bytes <= allowed_bytes);
+        let rows = fitting.ok_or_else(|| {
             Error::usage(format!(
                 "a row of {width} pixels takes {} KiB of memory, {} KiB are left for it",
                 row_bytes.div_ceil(1024),
@@ -255,10 +253,12 @@ impl Scene {
             ))
             .hint("allow a larger --memory, or picture a narrower part")
         })?;
+        let in_flight = read_ahead::in_flight(allowed_bytes, rows as u64 * row_bytes);
         // Rows of chunks begin at row 0 of what is stored.
         let before = self.area.y.rem_euclid(rows as i64) as usize;
         let tops = (0..before + height).step_by(rows);
-        Ok(tops.map(move |top| top.saturating_sub(before)..(top + rows - before).min(height)))
+        let bands = tops.map(move |top| top.saturating_sub(before)..(top + rows - before).min(height));
+        Ok((in_flight, bands))
     }
 
     /// Rows that are decoded together.
@@ -404,16 +404,12 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
 
 /// The model that an enlarged index at a path refers to; where it is not named, it lies beside it.
 pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) -> Result<Model> {
-    let attributes = enlarged.attributes()?;
-    let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or_default().to_owned();
     let path = match named {
         Some(path) => path.to_owned(),
-        None => beside(place, &text(attributes.get("model_name"))),
+        None => beside(place, enlarged.model_name().unwrap_or_default()),
     };
     let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
-    if text(attributes.get("recipe").and_then(|recipe| recipe.get("model")))
-        != model.digest_of(enlarged.method()?.stages())?
-    {
+    if enlarged.recipe().model != model.digest_of(enlarged.method().stages())? {
         return Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
             place.display(),

@@ -2,6 +2,7 @@
 //! shards, and cut to the window.
 
 use std::ops::Range;
+use std::path::Path;
 
 use btfkit_formats::{SampleType, Samples, f16};
 use rayon::prelude::*;
@@ -11,17 +12,13 @@ use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
 use crate::store::codec::{Chunk, ChunkCodec};
 use crate::store::mapped::MappedFile;
-use crate::store::shard;
+use crate::store::{DAMAGED, Store, shard};
 
 /// A shard, and where its chunks lie in it.
 struct Shard {
     file: MappedFile,
     chunks: Vec<Option<Range<usize>>>,
 }
-
-/// What to do about a shard that is damaged. Its other chunks may be all that is left of what they show.
-const DAMAGED: &str = "the store is damaged: if the archive is still there, move this file away and import again, which reads only \
-                       its view; if not, keep it: its other chunks can still be read";
 
 impl Measurement {
     /// Samples of a window under one view, [y, x, light, channel].
@@ -58,8 +55,9 @@ impl Measurement {
         }
         let texel_bytes = chunk.bytes() / (CHUNK_SIDE * CHUNK_SIDE);
         let row_bytes = window.size.width * texel_bytes;
-        let mut bytes = vec![0; window.size.height * row_bytes];
+        // Opened first: what is not there is not made room for.
         let shards = self.open_shards(array, view, window)?;
+        let mut bytes = vec![0; window.size.height * row_bytes];
         // Bands of the window that lie in one row of chunks each; every band is one thread's.
         let mut bands = Vec::new();
         let (mut rest, mut y) = (bytes.as_mut_slice(), window.y);
@@ -125,6 +123,31 @@ impl Measurement {
         codec.decode(bytes, texels).map_err(|error| damaged(&error.to_string()))
     }
 
+    /// Checks that a shard holds every chunk that lies in the plane.
+    fn expect_chunks(
+        &self,
+        path: &Path,
+        chunks: &[Option<Range<usize>>],
+        [sy, sx]: [usize; 2],
+    ) -> Result<()> {
+        let across = self.side / CHUNK_SIDE;
+        let Size { height, width } = self.description.size;
+        let inside = |place: usize| {
+            let (y, x) =
+                (sy * self.side + place / across * CHUNK_SIDE, sx * self.side + place % across * CHUNK_SIDE);
+            y < height && x < width
+        };
+        match (0..across * across)
+            .find(|&place| inside(place) && chunks.get(place).is_none_or(Option::is_none))
+        {
+            None => Ok(()),
+            Some(place) => {
+                let what = format!("{}: its chunk number {place} is absent", path.display());
+                Err(Error::input(what).hint(DAMAGED))
+            }
+        }
+    }
+
     /// Maps the shards that a window touches.
     fn open_shards(
         &self,
@@ -140,15 +163,10 @@ impl Measurement {
             .map(|[sy, sx]| {
                 let corner = Window { y: sy * self.side, x: sx * self.side, size: Size::new(1, 1) };
                 let path = self.shard_path(array, view, corner);
-                let file = MappedFile::open(&path).map_err(|error| match error.kind() {
-                    std::io::ErrorKind::NotFound => {
-                        Error::missing(format!("{}: this shard has not been written", path.display()))
-                            .hint("run the command that makes this store again; it goes on where it stopped")
-                    }
-                    _ => Error::io("read", &path, error),
-                })?;
+                let file = Store::map_chunk(&path)?;
                 let chunks = shard::chunk_ranges(file.as_ref(), across * across)
                     .map_err(|what| Error::input(format!("{}: {what}", path.display())).hint(DAMAGED))?;
+                self.expect_chunks(&path, &chunks, [sy, sx])?;
                 Ok(([sy, sx], Shard { file, chunks }))
             })
             .collect()

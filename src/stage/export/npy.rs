@@ -1,8 +1,8 @@
-//! One array for numpy, [view, light, y, x, channel], and two with its directions.
+//! One array for numpy, [view, light, y, x, channel], two with its directions, and the names of its channels.
 
 use std::io::Write;
 
-use btfkit_formats::npy::{directions_file, header, sample_bytes};
+use btfkit_formats::npy::{channels_file, directions_file, header, sample_bytes};
 
 use super::{Options, for_each_view};
 use crate::color::Transfer;
@@ -25,6 +25,7 @@ pub(super) fn write(
         let beside = options.output.with_extension(format!("{kind}.npy"));
         mapped::write_file(&beside, &directions_file(list))?;
     }
+    mapped::write_file(&options.output.with_extension("channels.txt"), &channels_file(&description.channels))?;
     output::write_whole(&options.output, |output| {
         output.write_all(&header(shape.map(|n| n as u64), description.sample_type)).map_err(failed)?;
         for_each_view(measurement, context, |_, images| {

@@ -178,7 +178,9 @@ impl NumberPrefix {
 /// `7,5`, `7p5`, `4.5e+01`, `1.2.3`.
 pub(crate) fn goes_on(rest: &str) -> bool {
     let mut chars = rest.chars();
-    let Some(mark) = chars.next().filter(|mark| ",.'pPeE\u{b7}\u{2019}".contains(*mark)) else { return false };
+    let Some(mark) = chars.next().filter(|mark| ",.'pPeE\u{b7}\u{2019}".contains(*mark)) else {
+        return false;
+    };
     let after = chars.as_str();
     let after = if "eE".contains(mark) { after.strip_prefix(['+', '-']).unwrap_or(after) } else { after };
     after.starts_with(|c: char| c.is_ascii_digit())

@@ -38,7 +38,9 @@ pub(crate) fn parts_of(path: &str) -> String {
         match part {
             "" | "." => {}
             ".." => kept.clear(),
-            drive if kept.is_empty() && matches!(drive.as_bytes(), [letter, b':'] if letter.is_ascii_alphabetic()) => {}
+            drive
+                if kept.is_empty()
+                    && matches!(drive.as_bytes(), [letter, b':'] if letter.is_ascii_alphabetic()) => {}
             other => kept.push(other),
         }
     }

@@ -142,7 +142,11 @@ impl Columns {
             let text = String::from_utf8_lossy(cell(column));
             let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
-                return Err(wrong(&field.name(), format!("{text:?}"), "a number, with a decimal point if it has a fraction"));
+                return Err(wrong(
+                    &field.name(),
+                    format!("{text:?}"),
+                    "a number, with a decimal point if it has a fraction",
+                ));
             };
             values.push((field, number));
         }

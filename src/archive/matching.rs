@@ -102,7 +102,12 @@ impl<'a> Matcher<'a> {
     }
 
     /// The one of these with the longest common end, or beside the list; else all that are left.
-    fn meant(&self, found: &[usize], listed: &Listed<'_>, folder: &Path) -> std::result::Result<usize, Vec<usize>> {
+    fn meant(
+        &self,
+        found: &[usize],
+        listed: &Listed<'_>,
+        folder: &Path,
+    ) -> std::result::Result<usize, Vec<usize>> {
         let common = |number: usize| {
             // The last part is the same as far as that is asked for.
             let (a, b) = (parts(self.names[number]).rev().skip(1), parts(listed.path).rev().skip(1));

@@ -4,6 +4,7 @@ use btfkit::archive::views::ArchiveViews;
 use btfkit::error::{Error, Result};
 use btfkit::picture::Ending;
 use btfkit::run::Context;
+use btfkit::stage::check::finding::MOST_ALARM;
 use btfkit::stage::check::{self, Finding, Report, State};
 use btfkit::stage::import;
 use btfkit::store::measurement::Measurement;
@@ -55,7 +56,7 @@ impl Check {
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
-            check::picture::sheet(&statistics, &findings).write(path)?;
+            check::picture::sheet(&statistics, &findings).write(path, context.existing)?;
         }
         let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
         if faults.is_empty() {
@@ -85,7 +86,10 @@ fn tell_report(report: &Report, tell: Tell) {
             State::Finding => "FINDING",
             State::NotChecked => "not checked",
         };
-        let alarm = check.alarm.map_or(String::new(), |alarm| format!("{:.0} %", 100.0 * alarm));
+        let alarm = check.alarm.map_or(String::new(), |alarm| {
+            let more = if alarm >= MOST_ALARM { ">" } else { "" };
+            format!("{more}{:.0} %", 100.0 * alarm)
+        });
         rows.push(row![check.name, state, alarm]);
     }
     // The reasons follow the table as they are: a column for them would be as wide as the longest.
@@ -95,10 +99,9 @@ fn tell_report(report: &Report, tell: Tell) {
     }
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
-        tell.line(format!(
-            "\n{severity}: {} (confidence {:.2})\n  {}",
-            finding.code, finding.confidence, finding.message
-        ));
+        tell.line("");
+        tell.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
+        tell.line(format!("  {}", finding.message));
         tell.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
             tell.line(format!("  repair:   btf import ... {repair}"));

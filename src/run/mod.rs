@@ -1,13 +1,16 @@
 //! What makes long work survive: units that are done or not, recipes that tell results apart,
 //! progress, and stopping on request.
 
+pub mod budget;
 pub mod progress;
+pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
+use crate::store::output::Existing;
 use progress::Progress;
 
 /// What every stage is given besides its options.
@@ -20,6 +23,8 @@ pub struct Context<'a> {
     pub threads: usize,
     /// Resident memory that the work may use.
     pub memory_bytes: u64,
+    /// What to do about what lies where a result is to be.
+    pub existing: Existing,
     pool: rayon::ThreadPool,
 }
 
@@ -35,8 +40,14 @@ impl<'a> Context<'a> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
-        Ok(Self { progress, stop, threads, memory_bytes, pool })
+            .map_err(|error| budget::cannot_start(threads, &error))?;
+        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+    }
+
+    /// The same, with results that take the place of what is there.
+    #[must_use]
+    pub fn with_existing(self, existing: Existing) -> Self {
+        Self { existing, ..self }
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.
@@ -44,8 +55,34 @@ impl<'a> Context<'a> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
     }
 
+    /// Checks that a stage gets the memory that it cannot do without, beside that of the program itself.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Usage`], with what it needs.
+    pub fn require(&self, what: &str, bytes: u64) -> Result<()> {
+        budget::require(what, bytes.saturating_add(budget::OWN_BYTES), self.memory_bytes)
+    }
+
+    /// Memory for the work itself.
+    pub fn work_bytes(&self) -> u64 {
+        self.memory_bytes.saturating_sub(budget::OWN_BYTES)
+    }
+
     /// Runs `work` on the pool.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
+}
+
+/// Starts a thread of a scope.
+///
+/// # Errors
+/// [`Kind::Io`] where the system starts none.
+fn spawn<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
+    started.map(|_| ()).map_err(|error| budget::cannot_start(1, &error))
 }

@@ -116,6 +116,7 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
         "views": degrees(&description.views),
         "lights": degrees(&description.lights),
         "images": source.check(context)?,
+        "reading": source.reading(),
         "transfer": description.transfer,
         "white": options.white,
         "codec": options.codec.name(),
@@ -170,7 +171,8 @@ impl Plan<'_> {
         let origin =
             Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
         let store = &self.options.store;
-        let measurement = Measurement::create(store, self.description.clone(), self.options.codec, &origin)?;
+        let measurement =
+            Measurement::create(store, self.description.clone(), self.options.codec, &origin, context)?;
         let (found, missing): (Vec<usize>, Vec<usize>) =
             self.views().partition(|&view| measurement.has_view(view));
         context.progress.begin("import", self.images(), Counted::Items("images"));
@@ -181,12 +183,13 @@ impl Plan<'_> {
         let channels = self.description.n_channels();
         let results = units::for_each(context, &missing, in_flight, |&view| {
             // A broken image does not keep the others from being looked at: all are named at the end.
-            match context.install(|| read_view(self.source, view, context)) {
+            match context.install(|| read_view(self.source, view, self.options.white, context)) {
                 Err(error) if error.kind() == Kind::Input => Ok(Err(error.to_string())),
                 Err(error) => Err(error),
-                Ok(images) => context.install(|| {
+                Ok((images, before)) => context.install(|| {
                     let images = Images::new(size, channels, sample_type, images)?;
-                    measurement.write_view(view, &images, &codes).map(Ok)
+                    let stored = measurement.write_view(view, &images, &codes)?;
+                    Ok(Ok(before.unwrap_or(stored)))
                 }),
             }
         })?;
@@ -200,8 +203,8 @@ impl Plan<'_> {
             }
         }
         if !problems.is_empty() {
-            return Err(Error::input(problems.join("\n"))
-                .hint("replace these images, delete the unfinished store and import again"));
+            return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
+                .hint("replace these images and import again: if they have changed, with --force"));
         }
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
@@ -210,11 +213,17 @@ impl Plan<'_> {
 /// Groups of images of a view: lights, and their samples [light, y, x, channel].
 pub(crate) type Groups = Vec<(std::ops::Range<usize>, Samples)>;
 
-/// The images of a view, read on the threads of the pool that this is called in.
+/// The images of a view, read on the threads of the pool that this is called in; and what was found in them before they
+/// were converted, where they were.
 ///
 /// # Errors
 /// Names every unusable image of the view.
-pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>) -> Result<Groups> {
+pub(crate) fn read_view(
+    source: &dyn Source,
+    view: usize,
+    white: f64,
+    context: &Context<'_>,
+) -> Result<(Groups, Option<Remarkable>)> {
     let lights = source.contents().lights.len();
     let step = source.lights_at_once().clamp(1, lights);
     let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
@@ -222,7 +231,7 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
         .into_par_iter()
         .map(|group| {
             context.check_stop()?;
-            let samples = source.read_images(view, group.clone());
+            let samples = source.read_counted(view, group.clone(), white);
             context.progress.advance(group.len() as u64);
             samples.map(|samples| (group, samples))
         })
@@ -230,14 +239,24 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
     context.check_stop()?;
     let mut problems = Vec::new();
     let mut images = Vec::new();
+    let mut before: Option<Remarkable> = None;
     for group in read {
         match group {
-            Ok(group) => images.push(group),
+            Ok((group, (samples, found))) => {
+                images.push((group, samples));
+                if let Some(found) = found {
+                    *before.get_or_insert_default() += found;
+                }
+            }
             Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
     }
-    if problems.is_empty() { Ok(images) } else { Err(Error::input(problems.join("\n"))) }
+    if problems.is_empty() {
+        Ok((images, before))
+    } else {
+        Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
+    }
 }
 
 /// The store that an archive goes to where none is named: its name with `.zarr`, in a folder.

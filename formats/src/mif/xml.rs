@@ -10,7 +10,7 @@ const MAX_ATTRIBUTES: usize = 256;
 
 /// Parses a text: no document type, no namespaces, no element of very many attributes, as many nodes as a zip may have
 /// entries. Nested elements cost the parser no stack.
-pub(super) fn parse(text: &str, limits: &Limits) -> Result<Document<'_>> {
+pub(super) fn parse<'a>(text: &'a str, limits: &Limits) -> Result<Document<'a>> {
     if text.contains("xmlns") {
         return Err(Error::new(ErrorKind::Unsupported, "XML with namespaces", "none"));
     }

@@ -111,7 +111,8 @@ impl ZeroBytes {
         for entry in self.entries.iter().filter(|entry| entry.table == name) {
             let about = format!("the line {name} {} {} {}", entry.row, entry.column, entry.value);
             if entry.column >= table.columns || entry.row >= table.rows {
-                let expected = format!("places in the table's {} rows and {} columns", table.rows, table.columns);
+                let expected =
+                    format!("places in the table's {} rows and {} columns", table.rows, table.columns);
                 return Err(Error::new(ErrorKind::Argument, about, expected));
             }
             let place = entry.row.saturating_mul(table.columns).saturating_add(entry.column);

@@ -6,9 +6,9 @@ use half::f16;
 
 use super::header::{Header, Scalar, elements, write};
 use crate::catalogue::repeated_direction;
+use crate::directions::published_name;
 use crate::file_name::repeated;
 use crate::text::utf8;
-use crate::directions::published_name;
 use crate::{Angles, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
 /// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0
@@ -48,7 +48,8 @@ pub fn channels(text: &[u8]) -> Result<Vec<String>> {
     }
     match repeated(names.iter().map(String::as_str)) {
         Some((first, again)) => {
-            let found = format!("one name in the lines {} and {}", first.saturating_add(1), again.saturating_add(1));
+            let found =
+                format!("one name in the lines {} and {}", first.saturating_add(1), again.saturating_add(1));
             Err(Error::malformed(found, "every channel once"))
         }
         None => Ok(names),

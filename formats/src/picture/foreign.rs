@@ -77,9 +77,8 @@ pub fn foreign(name: &str, bytes: &[u8]) -> Option<(&'static str, &'static str)>
     let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
     let tiff = bytes.starts_with(b"II*\0") || bytes.starts_with(b"MM\0*");
     let raw = RAW_ENDINGS.iter().find(|(known, _)| tiff && known.eq_ignore_ascii_case(ending));
-    let by_start = STARTS.iter().find(|(at, start, ..)| {
-        bytes.get(*at..).is_some_and(|rest| rest.starts_with(start))
-    });
+    let by_start =
+        STARTS.iter().find(|(at, start, ..)| bytes.get(*at..).is_some_and(|rest| rest.starts_with(start)));
     by_start.map(|&(_, _, what, way_out)| (what, way_out)).or(raw.map(|&(_, what)| (what, RAW)))
 }
 

@@ -73,12 +73,8 @@ fn angle_and_rest(stem: &str, key: [u8; 2]) -> Option<(f64, &str)> {
         let before = at.checked_sub(1).and_then(|at| bytes.get(at));
         !before.is_some_and(|byte| byte.is_ascii_alphabetic() || !byte.is_ascii())
     };
-    let mut numbers = bytes
-        .windows(2)
-        .enumerate()
-        .filter(is_key)
-        .filter(starts_word)
-        .filter_map(|(at, _)| {
+    let mut numbers =
+        bytes.windows(2).enumerate().filter(is_key).filter(starts_word).filter_map(|(at, _)| {
             let text = stem.get(at.checked_add(2)?..)?;
             let (number, rest) = text.split_at_checked(NumberPrefix::of(text)?.all)?;
             Some((number.parse().ok()?, rest))
@@ -210,7 +206,9 @@ mod tests {
         for name in ["a/tl7,5_pl0_tv22,5_pv90.jpg", "tl7_pl0_tv22_pv90_5.png", "tl7 pl0 tv2 5 pv90.png"] {
             assert!(half_read(name), "{name:?}");
         }
-        for name in ["00000 tl007 pl000 tv022 pv090.jpg", "tl7.5_pl0_tv22_pv90 b.jpg", "tl7,5.jpg", "a5.jpg", "x"] {
+        for name in
+            ["00000 tl007 pl000 tv022 pv090.jpg", "tl7.5_pl0_tv22_pv90 b.jpg", "tl7,5.jpg", "a5.jpg", "x"]
+        {
             assert!(!half_read(name), "{name:?}");
         }
     }

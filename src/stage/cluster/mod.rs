@@ -40,6 +40,9 @@ const METHOD: u64 = 2;
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;
 
+/// Clusters where no number is given.
+const USUAL_CLUSTERS: usize = 256;
+
 /// Most clusters that a search for an error goes up to.
 const MOST_SEARCHED: usize = 4096;
 
@@ -50,6 +53,8 @@ const PASSES: &str = "clustering";
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Amount {
+    /// 256, or as many as there are texels where those are fewer. Recipes have the number.
+    Usual,
     /// This many, n_c.
     Clusters(usize),
     /// The fewest whose weighted mean |dL*| from the centres is at most this.
@@ -214,7 +219,12 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let tile = model.tile()?;
     let description = measurement.description();
     let most = tile.size.texels().min(MOST_CLUSTERS);
+    let options = &match options.amount {
+        Amount::Usual => Options { amount: Amount::Clusters(most.min(USUAL_CLUSTERS)), ..options.clone() },
+        _ => options.clone(),
+    };
     let most_clusters = match options.amount {
+        Amount::Usual => most.min(USUAL_CLUSTERS),
         Amount::Clusters(clusters) if (1..=most).contains(&clusters) => clusters,
         Amount::Clusters(clusters) => {
             return Err(Error::usage(format!(
@@ -286,8 +296,8 @@ impl Plan {
         self.options.time.and_then(|time| Instant::now().checked_add(time))
     }
 
-    fn passes(&self) -> Result<Passes> {
-        Passes::create(&self.model.path().join(PASSES), &self.recipe)
+    fn passes(&self, context: &Context<'_>) -> Result<Passes> {
+        Passes::create(&self.model.path().join(PASSES), &self.recipe, context)
     }
 
     /// Views and lights.
@@ -297,14 +307,14 @@ impl Plan {
 
     /// Clusters the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe, context)? else {
             return self.done();
         };
         let deadline = self.deadline();
         if self.fits_the_sample() {
             return self.run_in_memory(deadline, context);
         }
-        let passes = self.passes()?;
+        let passes = self.passes(context)?;
         let (mut pass, mut state) = match passes.latest()? {
             Some(pass) => (pass, passes.state(pass, self.brdf(), self.selection.texels())?),
             None => self.prepare(&passes, deadline, context)?,
@@ -354,10 +364,12 @@ impl Plan {
         let _lock = match step {
             Step::Assign(..) if self.model.is_done(Stage::Cluster, &self.recipe)? => return done(),
             Step::Assign(..) => None,
-            Step::Prepare | Step::Reduce(_) => match self.model.begin(Stage::Cluster, &self.recipe)? {
-                Some(lock) => Some(lock),
-                None => return done(),
-            },
+            Step::Prepare | Step::Reduce(_) => {
+                match self.model.begin(Stage::Cluster, &self.recipe, context)? {
+                    Some(lock) => Some(lock),
+                    None => return done(),
+                }
+            }
         };
         if self.fits_the_sample() {
             return match step {
@@ -369,7 +381,7 @@ impl Plan {
                 .hint("run --step prepare first")),
             };
         }
-        let passes = self.passes()?;
+        let passes = self.passes(context)?;
         let latest = passes.latest()?;
         let begun = |asked: Option<usize>| match latest {
             Some(latest) if asked.is_none_or(|asked| asked <= latest) => Ok(latest),

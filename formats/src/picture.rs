@@ -16,12 +16,15 @@
 
 mod alpha;
 pub mod exr;
+mod foreign;
 mod hdr;
+pub(crate) mod orientation;
 pub mod png;
 mod size;
 mod tiff;
 mod wavelength;
 
+pub use foreign::foreign;
 pub use wavelength::wavelength_nm;
 
 use crate::{Error, ErrorKind, Limits, Result, SampleType, Samples, jpeg};
@@ -84,6 +87,11 @@ pub struct PictureHeader {
     pub linear: bool,
     /// A Radiance picture whose resolution line names X first, so that [`HdrOrientation`] matters.
     pub scanlines_are_columns: bool,
+    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF): 1..=8, 1 being as stored
+    /// and what is meant where it says nothing. Samples are handed out as stored.
+    pub orientation: u8,
+    /// The one layer of an OpenEXR picture whose channels are all in it.
+    pub layer: Option<String>,
 }
 
 /// How a Radiance picture is read whose resolution line is `+X n -Y n`.
@@ -183,6 +191,10 @@ pub fn decode_with(bytes: &[u8], options: &DecodeOptions, limits: &Limits) -> Re
 }
 
 fn require_format(bytes: &[u8]) -> Result<Format> {
+    // A Canon raw file begins as a TIFF does.
+    if let Some((what, way_out)) = foreign("", bytes) {
+        return Err(Error::new(ErrorKind::Unsupported, what, format!("a picture that is read; {way_out}")));
+    }
     recognise(bytes).ok_or_else(|| {
         let start = bytes.get(..bytes.len().min(8)).unwrap_or_default();
         Error::new(
@@ -202,6 +214,8 @@ fn of_jpeg(header: jpeg::Header) -> PictureHeader {
         sample_type: SampleType::U8,
         linear: false,
         scanlines_are_columns: false,
+        orientation: header.orientation,
+        layer: None,
     }
 }
 

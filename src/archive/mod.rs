@@ -9,6 +9,7 @@ mod container;
 mod files;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod matching;
 mod pictures;
 pub mod views;
 
@@ -22,12 +23,16 @@ use btfkit_formats::{Contents, Limits, Samples};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::color::Remarkable;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use adapt::Adaptation;
 
 /// Bytes that tell one container from another.
 const HEAD_BYTES: u64 = 4096;
+
+/// Longest list or table that is read.
+const MAX_LIST_BYTES: u64 = 64 << 20;
 
 /// Bytes of a file that are digested at a time.
 const DIGEST_STEP_BYTES: usize = 4 << 20;
@@ -45,6 +50,17 @@ pub trait Source: Send + Sync {
 
     /// The images of one view under a range of lights, [light, y, x, channel].
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples>;
+
+    /// The same, and what was found in the samples before they were converted to another type, where they were: clipped
+    /// as `white` says, negative, not finite.
+    fn read_counted(
+        &self,
+        view: usize,
+        lights: Range<usize>,
+        _white: f64,
+    ) -> Result<(Samples, Option<Remarkable>)> {
+        Ok((self.read_images(view, lights)?, None))
+    }
 
     /// How the archive is read where more than one way is possible; a part of the recipe of all that is made of it.
     fn reading(&self) -> Reading {
@@ -138,15 +154,27 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
     adapt::adapt(source, reading)
 }
 
-/// The bytes of a small file beside an archive.
+/// The bytes of a small file beside an archive: a list, a table.
 fn read_beside(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| Error::io("read", path, error))
+    let mut bytes = Vec::new();
+    let mut file = files::regular(path)?.take(MAX_LIST_BYTES + 1);
+    file.read_to_end(&mut bytes).map_err(|error| Error::io("read", path, error))?;
+    list_of_bounded_size(&path.display().to_string(), &bytes)?;
+    Ok(bytes)
+}
+
+/// Refuses a list that is too large to be one.
+fn list_of_bounded_size(name: &str, bytes: &[u8]) -> Result<()> {
+    if bytes.len() as u64 <= MAX_LIST_BYTES {
+        return Ok(());
+    }
+    Err(Error::input(format!("{name}: got more than {MAX_LIST_BYTES} bytes, expected a list of pictures")))
 }
 
 /// SHA-256 of a file's bytes.
 fn digest_of(path: &Path, context: &Context<'_>) -> Result<String> {
     let failed = |error| Error::io("read", path, error);
-    let mut file = std::fs::File::open(path).map_err(failed)?;
+    let mut file = files::regular(path)?;
     let mut digest = Sha256::new();
     let mut piece = vec![0; DIGEST_STEP_BYTES];
     loop {

@@ -1,10 +1,13 @@
 //! What makes long work survive: units that are done or not, recipes that tell results apart,
 //! progress, and stopping on request.
 
+pub mod budget;
 pub mod progress;
+pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
@@ -23,6 +26,7 @@ pub struct Context<'a> {
     pub memory_bytes: u64,
     /// What to do about what lies where a result is to be.
     pub existing: Existing,
+    computing: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
 
@@ -38,8 +42,16 @@ impl<'a> Context<'a> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
-        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+            .map_err(|error| budget::cannot_start(threads, &error))?;
+        Ok(Self {
+            progress,
+            stop,
+            threads,
+            memory_bytes,
+            existing: Existing::Keep,
+            computing: Arc::default(),
+            pool,
+        })
     }
 
     /// The same, with results that take the place of what is there.
@@ -53,8 +65,48 @@ impl<'a> Context<'a> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
     }
 
+    /// Checks that a stage gets the memory that it cannot do without, beside that of the program itself.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Usage`], with what it needs.
+    pub fn require(&self, what: &str, bytes: u64) -> Result<()> {
+        budget::require(what, bytes.saturating_add(budget::OWN_BYTES), self.memory_bytes)
+    }
+
+    /// Memory for the work itself.
+    pub fn work_bytes(&self) -> u64 {
+        self.memory_bytes.saturating_sub(budget::OWN_BYTES)
+    }
+
+    /// Runs `work` on the pool that may take long, writes nothing and does not look for a stop: while it runs,
+    /// [`Self::computing`] is set, and whoever started the program may end it.
+    pub fn compute<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.computing.store(true, Ordering::SeqCst);
+        let result = self.install(work);
+        self.computing.store(false, Ordering::SeqCst);
+        result
+    }
+
+    /// Set while there is nothing to lose but time.
+    pub fn computing(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.computing)
+    }
+
     /// Runs `work` on the pool.
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
+}
+
+/// Starts a thread of a scope.
+///
+/// # Errors
+/// [`Kind::Io`] where the system starts none.
+fn spawn<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
+    started.map(|_| ()).map_err(|error| budget::cannot_start(1, &error))
 }

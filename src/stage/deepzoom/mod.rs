@@ -10,6 +10,7 @@ mod place;
 pub mod pyramid;
 mod verify;
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -20,9 +21,9 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::picture;
-use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
+use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
 use crate::store::mapped::write_file;
@@ -178,7 +179,7 @@ impl Plan {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
         let left = context.memory_bytes.saturating_sub(needed);
-        let bands = self.scene.bands(left).map_err(|_| {
+        let (in_flight, bands) = self.scene.bands_in_flight(left).map_err(|_| {
             Error::usage(format!(
                 "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
                 window.size.width,
@@ -194,14 +195,13 @@ impl Plan {
         if !self.is_whole() {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
             let mut pixels = vec![[0.0; 3]; window.size.width];
-            for rows in bands {
-                context.check_stop()?;
-                let band = self.scene.read(rows.clone(), context)?;
-                for row in 0..rows.len() {
+            let read = |rows: Range<usize>| Ok((rows.len(), self.scene.read(rows, context)?));
+            read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
+                (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
-                    cascade.push(&self.pyramid, &pixels, &tiles)?;
-                }
-            }
+                    cascade.push(&self.pyramid, &pixels, &tiles)
+                })
+            })?;
         } else {
             tiles.found.store(total, Ordering::Relaxed);
         }

@@ -8,12 +8,13 @@ mod pictures;
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{SampleType, Samples, f16};
+use btfkit_formats::{SampleType, Samples};
 
+use crate::archive::adapt::half;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
 use crate::store::output::Made;
@@ -113,13 +114,17 @@ fn for_each_view(
 ) -> Result<()> {
     let description = measurement.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
-    for view in 0..description.views.len() {
-        context.check_stop()?;
+    // Read as texels, then turned.
+    let in_flight = read_ahead::in_flight(context.memory_bytes, 2 * description.view_bytes());
+    let read = |view| {
         let texels = measurement.read_reflectance(view, description.size.window())?;
-        each(view, images_of_texels(&texels, description.lights.len(), description.n_channels()))?;
+        Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))
+    };
+    read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, images)| {
+        each(view, images)?;
         context.progress.advance(1);
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Linear samples: halves for 8 bits, which are told apart by them, and for halves; floats for the others.
@@ -129,7 +134,7 @@ fn linear(samples: &Samples, transfer: Transfer) -> Samples {
     }
     let values = (0..samples.len()).map(|at| transfer.decode(samples.value(at).unwrap_or(0.0)));
     match samples.sample_type() {
-        SampleType::U8 | SampleType::F16 => Samples::F16(values.map(f16::from_f64).collect()),
+        SampleType::U8 | SampleType::F16 => Samples::F16(values.map(half).collect()),
         SampleType::U16 | SampleType::F32 => Samples::F32(values.map(|value| value as f32).collect()),
     }
 }

@@ -2,13 +2,14 @@
 
 mod scene;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
 use crate::picture::{Ending, Picture, stream};
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
@@ -88,25 +89,45 @@ pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_
     let size = scene.size();
     // Rows as values, bytes and packed bytes, and the file's buffers.
     let writing = 32 * size.width as u64 + WRITING_BYTES;
-    let mut bands = scene.bands(context.memory_bytes.saturating_sub(writing))?;
+    let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
-    let mut band: Option<(usize, usize, Band<'_>)> = None;
-    let made = stream::write(output, size, scene.meaning(), context.existing, |pixels| {
-        let (next, rows, read) = match band.take() {
-            Some(band) if band.0 < band.1 => band,
-            _ => {
-                context.check_stop()?;
-                let rows = bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
-                (0, rows.len(), scene.read(rows, context)?)
-            }
-        };
-        read.row(next, pixels);
-        band = Some((next + 1, rows, read));
-        context.progress.advance(1);
-        Ok(())
+    let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
+    let made = read_ahead::with(context, in_flight, bands, read, |bands| {
+        let mut rows = Rows { bands, band: None };
+        stream::write(output, size, scene.meaning(), context.existing, |pixels| {
+            rows.next(pixels)?;
+            context.progress.advance(1);
+            Ok(())
+        })
     })?;
     context.progress.end();
     Ok((size, made))
+}
+
+/// The rows of a picture, out of bands.
+struct Rows<'a, 'b> {
+    bands: &'a mut dyn Iterator<Item = Result<(usize, Band<'b>)>>,
+    /// The band, its rows, and which of them comes next.
+    band: Option<(usize, usize, Band<'b>)>,
+}
+
+impl Rows<'_, '_> {
+    /// Gives the next row.
+    fn next(&mut self, pixels: &mut [[f32; 3]]) -> Result<()> {
+        let (next, rows, band) = match self.band.take() {
+            Some(band) if band.0 < band.1 => band,
+            // Dropped first: no more bands are alive than memory was counted for.
+            done => {
+                drop(done);
+                let band = self.bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
+                let (rows, band) = band?;
+                (0, rows, band)
+            }
+        };
+        band.row(next, pixels);
+        self.band = Some((next + 1, rows, band));
+        Ok(())
+    }
 }
 
 /// The measurement itself, mixed between measured directions.

@@ -2,9 +2,11 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::run::Context;
-use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Samples};
+use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
+use btfkit::stage::verify::is_pyramid;
 use btfkit::stage::{estimate, import};
 use btfkit::store::codec::Chain;
+use btfkit::store::recognise::VERSION_2;
 use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
@@ -74,8 +76,8 @@ impl Info {
     /// Looks at one store, or at one archive in pieces perhaps.
     fn look(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Told> {
         let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
-        let has = |name: &str| first.join(name).exists();
-        if has("zarr.json") || has(".zgroup") || has(".zarray") {
+        let is_zarr = ["zarr.json"].iter().chain(&VERSION_2).any(|name| first.join(name).exists());
+        if is_zarr || is_pyramid(first) {
             return about::store(first).map(Told::Store);
         }
         let source = self.source.open(paths)?;
@@ -100,6 +102,7 @@ fn rows(told: &Told) -> Rows {
         Told::Store(About::Measurement(about)) => of_measurement(about),
         Told::Store(About::Model(about)) => of_model(about),
         Told::Store(About::Enlarged(about)) => of_enlarged(about),
+        Told::Store(About::Deepzoom(about)) => of_pyramid(about),
     }
 }
 
@@ -262,6 +265,27 @@ fn of_enlarged(about: &Grown) -> Rows {
         row!["clusters", about.clusters.map_or_else(unknown, |clusters| clusters.to_string())],
         row!["shards done", format!("{} of {}", about.shards_done, about.shards)],
     ]);
+    rows.extend(of_kept(&about.kept));
+    rows
+}
+
+fn of_pyramid(about: &Pyramidal) -> Rows {
+    let mut rows = vec![
+        row!["kind", "deepzoom"],
+        row!["size", format!("{}x{}", about.width, about.height)],
+        row!["levels", about.levels],
+        row![
+            "tiles",
+            format!(
+                "{} of {} and {} overlap, {}",
+                about.tiles, about.tile_side, about.overlap, about.tile_format
+            )
+        ],
+        row!["finished", yes(about.kept.finished)],
+    ];
+    for name in ["view", "light", "exposure"] {
+        rows.extend(about.recipe.get(name).map(|value| row![name, value]));
+    }
     rows.extend(of_kept(&about.kept));
     rows
 }

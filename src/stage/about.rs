@@ -7,7 +7,8 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::error::Result;
-use crate::stage::{cluster, normals};
+use crate::stage::verify::is_pyramid;
+use crate::stage::{cluster, deepzoom, normals};
 use crate::store::appearance::AppearanceReport;
 use crate::store::enlarged::{self, Enlarged, Method};
 use crate::store::field::FieldReport;
@@ -26,6 +27,8 @@ pub enum About {
     Model(Box<Modelled>),
     /// An enlarged index.
     Enlarged(Box<Grown>),
+    /// A Deep Zoom pyramid.
+    Deepzoom(Box<Pyramidal>),
 }
 
 /// What all stores have.
@@ -186,11 +189,38 @@ pub struct Grown {
     pub shards: usize,
 }
 
-/// Tells what the store at a path is.
+/// What a Deep Zoom pyramid is.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pyramidal {
+    /// As of a store; the bytes are those of its tiles.
+    #[serde(flatten)]
+    pub kept: Kept,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Number of levels.
+    pub levels: u32,
+    /// Number of tiles of all levels.
+    pub tiles: u64,
+    /// Side of a tile without its overlap.
+    pub tile_side: usize,
+    /// Pixels of its neighbours that a tile holds.
+    pub overlap: usize,
+    /// Format of the tiles.
+    pub tile_format: &'static str,
+    /// What it shows, and how.
+    pub recipe: Value,
+}
+
+/// Tells what the store or pyramid at a path is.
 ///
 /// # Errors
 /// Where there is none, or it is damaged so far that it cannot be told.
 pub fn store(path: &Path) -> Result<About> {
+    if is_pyramid(path) {
+        return deepzoom::about(path).map(|about| About::Deepzoom(Box::new(about)));
+    }
     let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
     let text = |name: &str| attributes.get(name).and_then(Value::as_str).unwrap_or_default().to_owned();
     let kept = |layout: u64, finished: bool| Kept {
@@ -287,7 +317,7 @@ fn of_enlarged(enlarged: &Enlarged, kept: impl Fn(u64, bool) -> Kept) -> Grown {
 }
 
 /// Bytes of all files below a folder, but for those of writers at work. Links are not followed.
-fn bytes_below(folder: &Path) -> u64 {
+pub(crate) fn bytes_below(folder: &Path) -> u64 {
     let (mut bytes, mut folders) = (0u64, vec![folder.to_owned()]);
     while let Some(at) = folders.pop() {
         for entry in std::fs::read_dir(&at).into_iter().flatten().flatten() {

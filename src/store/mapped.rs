@@ -229,18 +229,24 @@ fn remove_abandoned(path: &Path) {
     drop(opened);
 }
 
-/// Refuses what is no file: folders, pipes, devices and sockets.
-pub(crate) fn refuse_special(data: &fs::Metadata) -> io::Result<()> {
+/// What lies there where it is no file: a folder, a pipe, a device or a socket.
+pub(crate) fn special(data: &fs::Metadata) -> Option<&'static str> {
     use std::os::unix::fs::FileTypeExt;
     let kind = data.file_type();
-    let what = match kind {
-        _ if kind.is_file() => return Ok(()),
-        _ if kind.is_dir() => "a folder",
-        _ if kind.is_fifo() => "a pipe",
-        _ if kind.is_socket() => "a socket",
-        _ => "a device",
-    };
-    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("got {what}, expected a file")))
+    match kind {
+        _ if kind.is_file() => None,
+        _ if kind.is_dir() => Some("a folder"),
+        _ if kind.is_fifo() => Some("a pipe"),
+        _ if kind.is_socket() => Some("a socket"),
+        _ => Some("a device"),
+    }
+}
+
+/// Refuses what is no file.
+pub(crate) fn refuse_special(data: &fs::Metadata) -> io::Result<()> {
+    special(data).map_or(Ok(()), |what| {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("got {what}, expected a file")))
+    })
 }
 
 /// A file mapped for reading.

@@ -24,8 +24,10 @@ pub mod recognise;
 mod shard;
 pub mod tile_report;
 
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 use btfkit_formats::{SampleType, f16};
 use serde_json::{Map, Value, json};
@@ -73,12 +75,36 @@ pub struct Store {
     storage: Arc<MappedStorage>,
     /// Version of its layout.
     format: u64,
+    /// Our attributes of the root as they were read last, and of which file: they are asked for at every array.
+    known: Arc<Mutex<Option<(Stamp, Map<String, Value>)>>>,
+}
+
+/// What tells a file from the one that was at its place before: files are replaced, never written over.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Stamp {
+    device: u64,
+    inode: u64,
+    length: u64,
+    modified: Option<SystemTime>,
+}
+
+impl Stamp {
+    fn of(path: &Path) -> Option<Self> {
+        let data = std::fs::metadata(path).ok()?;
+        let (device, inode, length) = (data.dev(), data.ino(), data.len());
+        Some(Self { device, inode, length, modified: data.modified().ok() })
+    }
 }
 
 impl Store {
     /// The store at `path`, whether or not there is one yet.
     pub fn at(path: &Path) -> Self {
-        Self { path: path.to_owned(), storage: Arc::new(MappedStorage::new(path)), format: FORMAT }
+        Self {
+            path: path.to_owned(),
+            storage: Arc::new(MappedStorage::new(path)),
+            format: FORMAT,
+            known: Arc::default(),
+        }
     }
 
     /// Opens a store of this kind, and its attributes.
@@ -129,13 +155,24 @@ impl Store {
     /// # Errors
     /// Where the root group is damaged, or was changed.
     fn attributes(&self) -> Result<Option<Map<String, Value>>> {
+        let stamp = Stamp::of(&self.metadata_path(""));
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((of, ours)) = known.as_ref()
+            && Some(*of) == stamp
+        {
+            return Ok(Some(ours.clone()));
+        }
         let found = self.root()?.and_then(|mut attributes| attributes.remove("btfkit"));
-        let Some(found) = found else { return Ok(None) };
-        let check = |found: Value| match found {
-            Value::Object(ours) => metadata::check_ours(&ours, true).map(|()| Some(ours)),
-            other => Err(format!("attribute btfkit: got {}, expected an object", metadata::shown(&other))),
+        let ours = match found {
+            None => return Ok(None),
+            Some(Value::Object(ours)) => metadata::check_ours(&ours, true).map(|()| ours),
+            Some(other) => {
+                Err(format!("attribute btfkit: got {}, expected an object", metadata::shown(&other)))
+            }
         };
-        check(found).map_err(|what| self.changed("", &what))
+        let ours = ours.map_err(|what| self.changed("", &what))?;
+        *known = stamp.map(|stamp| (stamp, ours.clone()));
+        Ok(Some(ours))
     }
 
     /// All attributes of the root group; `None` where there is none.

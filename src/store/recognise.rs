@@ -8,13 +8,16 @@ use std::path::Path;
 use btfkit_formats::{big, bonn, mif, mlvq};
 use serde_json::{Value, json};
 
-use super::mapped::{is_temporary, refuse_special};
+use super::mapped::{is_temporary, special};
 use super::metadata::read_object;
 use super::{enlarged, is_lock, measurement, model};
 use crate::error::{Error, Result};
 
 /// Bytes that tell one file from another.
 const HEAD_BYTES: u64 = 4096;
+
+/// Files by which stores of Zarr version 2 are known.
+pub const VERSION_2: [&str; 4] = [".zgroup", ".zarray", ".zmetadata", ".zattrs"];
 
 /// Entries of a folder that are looked at.
 const MOST_ENTRIES: usize = 10_000;
@@ -34,6 +37,8 @@ pub(super) struct Other {
 }
 
 enum Use {
+    /// A store of an older Zarr, which stores here never were.
+    OldZarr,
     /// It can be imported.
     Import,
     /// Nothing that this program knows.
@@ -55,8 +60,8 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
     if data.is_dir() {
         return of_folder(path);
     }
-    if let Err(special) = refuse_special(&data) {
-        return Ok(Some(Other { what: format!("something else: {special}"), use_it: Use::Nothing }));
+    if let Some(special) = special(&data) {
+        return Ok(Some(Other { what: special.to_owned(), use_it: Use::Nothing }));
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
@@ -96,14 +101,9 @@ fn of_file(head: &[u8]) -> Other {
 }
 
 fn of_folder(path: &Path) -> Result<Option<Other>> {
-    for (file, what) in
-        [(".zgroup", "group"), (".zarray", "array"), (".zmetadata", "group"), (".zattrs", "group")]
-    {
-        if path.join(file).exists() {
-            let what = format!("a Zarr store of version 2 (a {what}: {file})");
-            let advice = "stores are of Zarr version 3: make it with this program";
-            return Ok(Some(Other { what, use_it: Use::Advice(advice) }));
-        }
+    if let Some(file) = VERSION_2.into_iter().find(|file| path.join(file).exists()) {
+        let what = format!("a Zarr store of version 2 ({file})");
+        return Ok(Some(Other { what, use_it: Use::OldZarr }));
     }
     if path.join(PYRAMID_STATE).exists() {
         let what = "the tiles of a Deep Zoom pyramid".to_owned();
@@ -161,6 +161,7 @@ impl Other {
                     path.display()
                 ))
             }
+            Use::OldZarr => error.hint("make the store with this program, from the archive"),
             Use::Advice(advice) => error.hint(advice),
             Use::Nothing => error,
         }

@@ -30,7 +30,7 @@ use crate::store::mapped::write_file;
 use cascade::{Cascade, Sink};
 use place::Place;
 use pyramid::Pyramid;
-pub(crate) use verify::verify;
+pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
 pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;

@@ -44,6 +44,11 @@ impl Place {
         })
     }
 
+    /// The folder of the tiles.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The file of a tile.
     pub(super) fn tile(&self, level: u32, row: usize, column: usize) -> PathBuf {
         self.folder.join(level.to_string()).join(format!("{column}_{row}.{}", self.ending))
@@ -61,7 +66,14 @@ impl Place {
     }
 
     fn compare(&self, recipe: &Value) -> Result<()> {
-        if let Some(found) = self.state()? {
+        // A damaged one is another one: it can be replaced on request.
+        let state = self.state().map_err(|error| match error.kind() {
+            crate::Kind::Input => {
+                Error::recipe(error.to_string()).hint("choose another name, or use --force")
+            }
+            _ => error,
+        })?;
+        if let Some(found) = state {
             return recipe::expect_same(&self.description, &found, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {

@@ -1,11 +1,11 @@
 //! Is a pyramid whole and undamaged? Its description and its viewer follow from the recipe, and every tile is decoded.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use btfkit_formats::{Limits, picture};
 use rayon::prelude::*;
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::place::Place;
 use super::pyramid::Pyramid;
@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::Size;
+use crate::stage::about::{Kept, Pyramidal, bytes_below};
 use crate::stage::verify::Report;
 use crate::store::mapped::MappedFile;
 use crate::store::metadata;
@@ -104,28 +105,72 @@ fn open(path: &Path) -> Result<MappedFile> {
     })
 }
 
+/// A pyramid that is there.
+struct Opened {
+    description: PathBuf,
+    state: Map<String, Value>,
+    recipe: Recipe,
+    pyramid: Pyramid,
+    place: Place,
+}
+
+impl Opened {
+    /// The pyramid whose description, or folder of tiles, lies at a path.
+    fn at(path: &Path) -> Result<Self> {
+        let path: PathBuf = path.components().collect();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let description = match name.strip_suffix(PYRAMID_FOLDER) {
+            Some(stem) => path.with_file_name(format!("{stem}.dzi")),
+            None => path.clone(),
+        };
+        let refused = |what: &str| {
+            Error::input(format!("{}: the recipe of its tiles: {what}", description.display()))
+                .hint("make the pyramid anew: under another name, or with --force")
+        };
+        let state = Place::new(&description, Encoding::Png)?.state()?.ok_or_else(|| {
+            Error::missing(format!(
+                "{}: no folder of tiles with a recipe of this program",
+                description.display()
+            ))
+        })?;
+        let recipe = state.get("recipe").cloned().unwrap_or_default();
+        let recipe: Recipe = serde_json::from_value(recipe).map_err(|error| refused(&error.to_string()))?;
+        let pyramid = recipe.pyramid().ok_or_else(|| refused("sizes that no pyramid has"))?;
+        let place = Place::new(&description, recipe.encoding())?;
+        Ok(Self { description, state, recipe, pyramid, place })
+    }
+}
+
+/// Tells what a pyramid is, without reading its tiles.
+///
+/// # Errors
+/// Where there is none, or its recipe is damaged.
+pub(crate) fn about(path: &Path) -> Result<Pyramidal> {
+    let Opened { description, state, recipe, pyramid, place } = Opened::at(path)?;
+    Ok(Pyramidal {
+        kept: Kept {
+            version: state.get("version").and_then(Value::as_str).unwrap_or_default().to_owned(),
+            layout: state.get("format").and_then(Value::as_u64).unwrap_or(metadata::OLDEST_FORMAT),
+            stored_bytes: bytes_below(place.folder()),
+            finished: description.exists(),
+        },
+        width: pyramid.size.width,
+        height: pyramid.size.height,
+        levels: pyramid.top() + 1,
+        tiles: pyramid.tiles(),
+        tile_side: pyramid.side,
+        overlap: pyramid.overlap,
+        tile_format: recipe.encoding().ending(),
+        recipe: state.get("recipe").cloned().unwrap_or_default(),
+    })
+}
+
 /// Reads all of a pyramid: `path` is its description or the folder of its tiles.
 ///
 /// # Errors
 /// Where there is none, or its recipe is damaged; and those of the operating system.
 pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
-    let path: std::path::PathBuf = path.components().collect();
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let description = match name.strip_suffix(PYRAMID_FOLDER) {
-        Some(stem) => path.with_file_name(format!("{stem}.dzi")),
-        None => path.clone(),
-    };
-    let refused = |what: &str| {
-        Error::input(format!("{}: the recipe of its tiles: {what}", description.display()))
-            .hint("make the pyramid anew: under another name, or with --force")
-    };
-    let state = Place::new(&description, Encoding::Png)?.state()?.ok_or_else(|| {
-        Error::missing(format!("{}: no folder of tiles with a recipe of this program", description.display()))
-    })?;
-    let recipe = state.get("recipe").cloned().unwrap_or_default();
-    let recipe: Recipe = serde_json::from_value(recipe).map_err(|error| refused(&error.to_string()))?;
-    let pyramid = recipe.pyramid().ok_or_else(|| refused("sizes that no pyramid has"))?;
-    let place = Place::new(&description, recipe.encoding())?;
+    let Opened { description, state, recipe, pyramid, place } = Opened::at(path)?;
     let mut report = Report::of("deepzoom");
     report.checked("size", pyramid.size.to_string());
     report.checked("levels", (pyramid.top() + 1).to_string());

@@ -167,6 +167,12 @@ impl Plan<'_> {
 
     /// Imports the views that are not in the store yet.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let unit = format!(
+            "importing views of {} under {} lights",
+            self.description.size,
+            self.description.lights.len()
+        );
+        context.require(&unit, self.unit_bytes())?;
         let contents = self.source.contents();
         let origin =
             Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };

@@ -61,6 +61,9 @@ pub fn plan(options: &Options) -> Result<Plan> {
     Ok(Plan { measurement, model, robust: options.robust, recipe })
 }
 
+/// Memory of a texel of the normal map: twice its normal, and what is written of it.
+const TEXEL_BYTES: u64 = 48;
+
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
@@ -76,6 +79,9 @@ impl Plan {
         let view = frontal_view(&self.measurement);
         let tile = self.model.tile()?;
         let bounds = tile.bounds();
+        let band = (BAND_ROWS * bounds.size.width * description.texel_bytes()) as u64;
+        let needed = 2 * band + TEXEL_BYTES * bounds.size.texels() as u64;
+        context.require(&format!("normals of {}", bounds.size), needed)?;
         context.progress.begin("normals", bounds.size.height as u64, Counted::Items("rows"));
         let plane = of_window(&self.measurement, view, self.robust, bounds, context)?;
         context.progress.end();

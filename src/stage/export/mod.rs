@@ -19,6 +19,9 @@ use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
 use crate::store::output::Made;
 
+/// A view as it is read, turned into images, and encoded.
+const VIEW_COPIES: u64 = 4;
+
 /// What to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -76,6 +79,9 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         let found = format!("{}: {done} of {views} views are there", measurement.path().display());
         return Err(Error::missing(found).hint("finish its import first"));
     }
+    let description = measurement.description();
+    let what = format!("exporting views of {} under {} lights", description.size, description.lights.len());
+    context.require(&what, VIEW_COPIES * description.view_bytes())?;
     let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
         Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,

@@ -21,6 +21,10 @@ pub use crate::store::tile_report::TileReport as Report;
 use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use features::lattice_of;
 
+/// Memory of a texel of the plane: its codes under some directions, their components, and the transforms in which a
+/// lattice is looked for (measured).
+const TEXEL_BYTES: u64 = 290;
+
 /// How to cut a tile.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -105,6 +109,8 @@ impl Plan {
         };
         let description = self.measurement.description();
         let plane = description.size;
+        let needed = plane.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64);
+        context.require(&format!("choosing a tile from a plane of {plane}"), needed)?;
         let features = features(&self.measurement, context)?;
         let (tile, patch, lattice) = context.compute(|| self.tile(&features))?;
         let report = Report {

@@ -312,7 +312,7 @@ fn attributes_that_do_not_fit_are_refused() {
     assert!(told.contains("attribute kind"), "{told}");
     let told = with(&|file| file.attr("format").unwrap().write_scalar(&2i64).unwrap());
     assert!(told.contains("format: got 2, expected 1"), "{told}");
-    for name in ["transfer", "radiometry"] {
+    for name in ["kind", "transfer", "radiometry"] {
         let told = with(&|file| {
             file.delete_attr(name).unwrap();
             let text: VarLenUnicode = "linear".parse().unwrap();

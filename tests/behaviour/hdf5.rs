@@ -63,6 +63,10 @@ fn pick(samples: &Samples, places: impl Iterator<Item = usize>) -> Samples {
 }
 
 fn write(path: &Path, contents: &Contents, luminance: bool) {
+    // A writer replaces nothing.
+    if path.exists() {
+        std::fs::remove_file(path).unwrap();
+    }
     let attributes =
         json!({"white": 0.75, "version": "0.1", "recipe": {"stage": "import", "views": [[0.5, 1]]}});
     let mut writer = Writer::create(path, contents, attributes.as_object().unwrap()).unwrap();

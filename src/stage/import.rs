@@ -206,6 +206,7 @@ impl Plan<'_> {
             return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));
         }
+        measurement.finish(context)?;
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
 }

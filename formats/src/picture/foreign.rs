@@ -68,7 +68,7 @@ const RAW_ENDINGS: [(&str, &str); 8] = [
     ("iiq", "a Phase One raw file"),
 ];
 
-/// What a file is, by its first bytes (some hundred) or its name, and what to do about it; `None` if it is nothing known,
+/// What a file is, by its first bytes or its name, and what to do about it; `None` if it is nothing known,
 /// or a picture that is read.
 ///
 /// ```

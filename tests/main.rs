@@ -40,6 +40,8 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/odd_archives.rs"]
+mod odd_archives;
 #[path = "behaviour/option_effects.rs"]
 #[allow(dead_code)] // the program's own tests read the rest
 mod option_effects;

@@ -1,5 +1,5 @@
-//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from
-//! the whole measurement.
+//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from the
+//! whole measurement or from the first mini-batch.
 
 use std::time::Instant;
 
@@ -84,6 +84,8 @@ impl Plan {
             index: Vec::new(),
             history: History {
                 passes: Vec::new(),
+                batches: Vec::new(),
+                batch: self.first_batch(),
                 sample_texels: self.sample_texels(),
                 sample_passes: clustering.passes,
                 ..history
@@ -134,13 +136,15 @@ impl Plan {
 
     /// Reads the texels of the sample, in the order of their numbers.
     pub(super) fn read_sample(&self, context: &Context<'_>) -> Result<Points> {
-        let sample = self.selection.sample(self.sample_texels(), self.options.seed);
+        let blocks = self.first_batch().unwrap_or(self.selection.blocks().len());
+        let sample = self.selection.sample(blocks, self.sample_texels(), self.options.seed);
         let stride = self.arrangement.stride();
         let mut vectors = vec![0; sample.len() * stride];
         let title = if self.fits_the_sample() { "read luminance" } else { "read sample" };
-        context.progress.begin(title, self.selection.texels() as u64, Counted::Items("texels"));
+        let passing = self.selection.slots_of(&(0..blocks)).len();
+        context.progress.begin(title, passing as u64, Counted::Items("texels"));
         let mut stream = Stream::new(&self.measurement, &self.arrangement, &self.selection, 0);
-        stream.for_each(0..self.selection.blocks().len(), context, |block, read| {
+        stream.for_each(0..blocks, context, |block, read| {
             for (vector, number) in read.chunks_exact(stride).zip(self.selection.numbers(block.slots.clone()))
             {
                 if let Ok(at) = sample.binary_search(number) {

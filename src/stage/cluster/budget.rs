@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::stage::cluster::stream::Stream;
-use crate::stage::cluster::{Amount, Plan};
+use crate::stage::cluster::{Amount, First, Plan};
+use crate::texel::cluster::seeding;
 use crate::texel::cluster::tally::Tally;
 
 /// The program itself, and what allocators keep.
@@ -31,7 +32,12 @@ impl Plan {
     /// Texels of the sample.
     pub(super) fn sample_texels(&self) -> usize {
         let affordable = SAMPLE_BYTES / self.arrangement.stride();
-        self.options.sample.unwrap_or(affordable).max(self.least_sample()).min(self.selection.texels())
+        let least = self.least_sample();
+        let enough = match self.first {
+            First::Sample => affordable,
+            First::Minibatch => seeding::drawn_from(least).min(affordable),
+        };
+        self.options.sample.unwrap_or(enough).max(least).min(self.selection.texels())
     }
 
     /// No fewer texels than clusters that are asked for.

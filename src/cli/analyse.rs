@@ -275,7 +275,7 @@ fn run_clusters(
     context: &Context<'_>,
 ) -> Result<cluster::Report> {
     match &options.clusters_of {
-        Some(from) => taken_plan(model, from)?.run(),
+        Some(from) => taken_plan(model, from)?.run(context),
         None => cluster_plan(measurement, model, options, seed)?.run(context),
     }
 }
@@ -379,11 +379,11 @@ impl Compare {
                     format!("{:.3}", errors.ciede2000)
                 ]);
             }
-            tell.line(table(&rows));
+            tell.text(&table(&rows));
             tell.line(format!("CIEDE2000 over {} texels, the other figures over all", report.colour_texels));
         }
         match &self.picture {
-            Some(path) => self.side_by_side(context)?.write(path),
+            Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),
             None => Ok(()),
         }
     }

@@ -55,7 +55,7 @@ impl Check {
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
-            check::picture::sheet(&statistics, &findings).write(path)?;
+            check::picture::sheet(&statistics, &findings).write(path, context.existing)?;
         }
         let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
         if faults.is_empty() {
@@ -95,10 +95,9 @@ fn tell_report(report: &Report, tell: Tell) {
     }
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
-        tell.line(format!(
-            "\n{severity}: {} (confidence {:.2})\n  {}",
-            finding.code, finding.confidence, finding.message
-        ));
+        tell.line("");
+        tell.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
+        tell.line(format!("  {}", finding.message));
         tell.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
             tell.line(format!("  repair:   btf import ... {repair}"));

@@ -5,8 +5,8 @@ use btfkit::run::Context;
 use btfkit::stage::image;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
 use super::scene::SceneArgs;
+use super::{Tell, found};
 
 /// Picture of a measurement, a model's tile or an enlarged index
 #[derive(Args)]
@@ -51,8 +51,8 @@ impl Image {
             What::Normals => image::Subject::Normals,
         };
         let options = self.scene.options(&self.source, subject);
-        let size = image::run(&options, self.scene.exposure, &self.out, context)?;
-        tell.line(format!("{}: {size}", self.out.display()));
+        let (size, made) = image::run(&options, self.scene.exposure, &self.out, context)?;
+        tell.line(format!("{}: {size}{}", self.out.display(), found(made)));
         Ok(())
     }
 }

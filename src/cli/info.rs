@@ -70,7 +70,7 @@ impl Info {
                 kind => vec![row!["kind", kind.unwrap_or("unknown")]],
             },
         };
-        tell.line(table(&rows));
+        tell.text(&table(&rows));
         Ok(())
     }
 

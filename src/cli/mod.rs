@@ -29,6 +29,8 @@ use std::sync::atomic::AtomicBool;
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Progress, Silent};
+use btfkit::store::output::{Existing, Made};
+use btfkit::text::{escaped, escaped_json, escaped_lines};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use serde_json::Value;
 
@@ -64,6 +66,10 @@ struct Common {
     /// How to tell progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
+    /// Replace files that are where results are to be, and make anew what another recipe made there. Without it nothing
+    /// that exists is ever replaced
+    #[arg(long, global = true)]
+    force: bool,
     /// Say nothing but errors
     #[arg(long, short, global = true)]
     quiet: bool,
@@ -116,6 +122,8 @@ pub(crate) fn run() -> ExitCode {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
+    // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
         _ if cli.common.quiet => Box::new(Silent),
         ProgressStyle::None => Box::new(Silent),
@@ -123,13 +131,17 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
     let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
+        .map(|context| {
+            context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
+        })
         .and_then(|context| cli.command.run(&context, Tell { quiet: cli.common.quiet }));
     progress.end();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
-            let _ = writeln!(std::io::stderr(), "btf: {error}{hint}");
+            let told = format!("btf: {error}{hint}");
+            let _ = writeln!(std::io::stderr(), "{}", escaped_lines(&told));
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -178,7 +190,17 @@ struct Tell {
 }
 
 impl Tell {
+    /// One line. Whatever it names cannot end it, or change what the terminal shows.
     fn line(self, text: impl std::fmt::Display) {
+        self.print(&escaped(&text.to_string()));
+    }
+
+    /// Lines, of a table say, whose cells are escaped already.
+    fn text(self, text: &str) {
+        self.print(&escaped_lines(text));
+    }
+
+    fn print(self, text: &str) {
         if !self.quiet {
             // A closed pipe (`btf info x | head -1`) is no failure.
             let _ = writeln!(std::io::stdout(), "{text}");
@@ -188,7 +210,7 @@ impl Tell {
     fn plan(self, summary: &Value) -> Result<()> {
         let text =
             serde_json::to_string_pretty(summary).map_err(|error| Error::internal(error.to_string()))?;
-        self.line(text);
+        self.print(&escaped_json(&text));
         Ok(())
     }
 }
@@ -207,6 +229,14 @@ fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
         _ => return Err(expected()),
     };
     number.checked_mul(1 << shift).filter(|&bytes| bytes > 0).ok_or_else(expected)
+}
+
+/// What a line about a result ends with.
+fn found(made: Made) -> &'static str {
+    match made {
+        Made::Written => "",
+        Made::Found => ", found done",
+    }
 }
 
 /// Bytes for people.

@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use btfkit::run::progress::{Counted, Progress};
+use btfkit::text::{escaped, escaped_json};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 /// Least time between two JSON lines.
@@ -34,7 +35,7 @@ impl Progress for Bars {
                 "{prefix:>20} {bar:32} {bytes}/{total_bytes} ({bytes_per_sec}, {eta} left) {wide_msg}"
             }
         };
-        let bar = ProgressBar::new(total).with_prefix(title.to_owned());
+        let bar = ProgressBar::new(total).with_prefix(escaped(title).into_owned());
         let rate = |state: &ProgressState, to: &mut dyn std::fmt::Write| {
             let _ = write!(to, "{:.0}/s", state.per_sec());
         };
@@ -52,12 +53,22 @@ impl Progress for Bars {
     }
 
     fn remark(&self, text: &str) {
-        self.with(|bar| bar.set_message(text.to_owned()));
+        self.with(|bar| bar.set_message(escaped(text).into_owned()));
     }
 
     fn end(&self) {
         if let Some(bar) = self.bar.lock().unwrap_or_else(PoisonError::into_inner).take() {
             bar.finish_and_clear();
+        }
+    }
+
+    fn notice(&self, text: &str) {
+        let tell = || {
+            let _ = writeln!(std::io::stderr(), "btf: {}", escaped(text));
+        };
+        match &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(bar) => bar.suspend(tell),
+            None => tell(),
         }
     }
 }
@@ -87,8 +98,12 @@ impl Step {
             "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
             "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
         });
-        let _ = writeln!(std::io::stderr(), "{line}");
+        write_line(&line);
     }
+}
+
+fn write_line(line: &serde_json::Value) {
+    let _ = writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string()));
 }
 
 impl Progress for Lines {
@@ -124,5 +139,9 @@ impl Progress for Lines {
         if let Some(step) = self.step.lock().unwrap_or_else(PoisonError::into_inner).take() {
             step.tell("end");
         }
+    }
+
+    fn notice(&self, text: &str) {
+        write_line(&serde_json::json!({"event": "notice", "text": text}));
     }
 }

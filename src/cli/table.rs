@@ -16,8 +16,8 @@ pub(super) fn table(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A row from anything that can be shown.
+/// A row from anything that can be shown; a cell is one line.
 macro_rules! row {
-    ($($cell:expr),* $(,)?) => { vec![$(format!("{}", $cell)),*] };
+    ($($cell:expr),* $(,)?) => { vec![$(btfkit::text::escaped(&format!("{}", $cell)).into_owned()),*] };
 }
 pub(super) use row;

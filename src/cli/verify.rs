@@ -4,6 +4,7 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::stage::verify;
 use btfkit::store::measurement::Measurement;
+use btfkit::text::escaped;
 use clap::Args;
 
 use super::Tell;
@@ -39,7 +40,7 @@ impl Verify {
             let report = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
             tell.plan(&report)?;
         } else {
-            tell.line(self.told(&report, measurement.description().views.len()));
+            tell.text(&self.told(&report, measurement.description().views.len()));
         }
         self.judge(&report)
     }
@@ -60,7 +61,10 @@ impl Verify {
             let [y, x] = damage.texel;
             text.push_str(&format!(
                 "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
-                damage.array, damage.view, damage.file, damage.what
+                damage.array,
+                damage.view,
+                escaped(&damage.file),
+                escaped(&damage.what)
             ));
         }
         for (view, light) in &report.different_images {

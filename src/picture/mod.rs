@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::color::srgb_encode_all;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
-use crate::store::mapped::write_file;
+use crate::store::output::{Existing, Made, write_new};
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,12 +138,15 @@ impl Picture {
     }
 
     /// Writes a PNG or an EXR file, by the ending of its name; it appears whole or not at all.
-    pub fn write(&self, path: &Path) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`crate::Kind::Recipe`] where another file is.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<Made> {
         let bytes = match Ending::of(path)? {
             Ending::Png => self.png()?,
             Ending::Exr => self.exr()?,
         };
-        write_file(path, &bytes)
+        write_new(path, existing, &bytes)
     }
 }
 
@@ -151,8 +154,8 @@ impl Picture {
 pub fn png(size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut writer = stream::png_header(&mut bytes, size)?;
-    writer.write_image_data(pixels).map_err(|error| stream::png_failed(&error))?;
-    writer.finish().map_err(|error| stream::png_failed(&error))?;
+    writer.write_image_data(pixels).map_err(stream::png_failed)?;
+    writer.finish().map_err(stream::png_failed)?;
     Ok(bytes)
 }
 

@@ -1,7 +1,6 @@
 //! Picture files written row by row, so that a picture may be larger than memory.
 
-use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use exr::block::writer::ChunksWriter;
@@ -13,7 +12,7 @@ use exr::meta::header::Header;
 use crate::error::{Error, Result};
 use crate::picture::{Ending, Meaning};
 use crate::shape::Size;
-use crate::store::output::write_whole;
+use crate::store::output::{Existing, Made, write_whole};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
@@ -22,15 +21,16 @@ const PIECE_BYTES: usize = 64 << 10;
 /// it appears whole or not at all.
 ///
 /// # Errors
-/// Those of `row` and of writing.
+/// Those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
 pub fn write(
     path: &Path,
     size: Size,
     meaning: Meaning,
+    existing: Existing,
     row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
-) -> Result<()> {
+) -> Result<Made> {
     let ending = Ending::of(path)?;
-    write_whole(path, |output: &mut BufWriter<File>| match ending {
+    write_whole(path, existing, |output| match ending {
         Ending::Png => png(output, size, meaning, row),
         Ending::Exr => exr(output, size, row),
     })
@@ -44,16 +44,16 @@ fn png(
     mut row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<()> {
     let mut writer = png_header(output, size)?;
-    let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(|error| png_failed(&error))?;
+    let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(png_failed)?;
     let mut pixels = vec![[0.0; 3]; size.width];
     let mut bytes = vec![0; 3 * size.width];
     for _ in 0..size.height {
         row(&mut pixels)?;
         meaning.encode(&pixels, &mut bytes);
-        stream.write_all(&bytes).map_err(|error| png_failed(&error))?;
+        stream.write_all(&bytes).map_err(refused)?;
     }
-    stream.finish().map_err(|error| png_failed(&error))?;
-    writer.finish().map_err(|error| png_failed(&error))
+    stream.finish().map_err(png_failed)?;
+    writer.finish().map_err(png_failed)
 }
 
 /// Begins a PNG of 8-bit sRGB values.
@@ -63,12 +63,20 @@ pub(super) fn png_header<W: Write>(output: W, size: Size) -> Result<png::Writer<
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    encoder.write_header().map_err(|error| png_failed(&error))
+    encoder.write_header().map_err(png_failed)
 }
 
 /// An error of writing a PNG.
-pub(super) fn png_failed(error: &dyn std::fmt::Display) -> Error {
-    Error::internal(format!("cannot encode a PNG: {error}"))
+pub(super) fn png_failed(error: png::EncodingError) -> Error {
+    match error {
+        png::EncodingError::IoError(error) => refused(error),
+        error => Error::internal(format!("cannot encode a PNG: {error}")),
+    }
+}
+
+/// What the operating system refused; the caller knows the path.
+fn refused(error: std::io::Error) -> Error {
+    Error::refused("write", error)
 }
 
 /// An EXR of the values as 32-bit floats, a row a block.
@@ -101,6 +109,7 @@ pub(super) fn exr(
     });
     match (failed, written) {
         (Some(error), _) => Err(error),
+        (None, Err(exr::error::Error::Io(error))) => Err(refused(error)),
         (None, written) => written.map_err(|error| Error::internal(format!("cannot encode an EXR: {error}"))),
     }
 }

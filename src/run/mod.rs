@@ -9,6 +9,7 @@ pub mod units;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Kind, Result};
+use crate::store::output::Existing;
 use progress::Progress;
 
 /// What every stage is given besides its options.
@@ -21,6 +22,8 @@ pub struct Context<'a> {
     pub threads: usize,
     /// Resident memory that the work may use.
     pub memory_bytes: u64,
+    /// What to do about what lies where a result is to be.
+    pub existing: Existing,
     pool: rayon::ThreadPool,
 }
 
@@ -37,7 +40,13 @@ impl<'a> Context<'a> {
             .num_threads(threads)
             .build()
             .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
-        Ok(Self { progress, stop, threads, memory_bytes, pool })
+        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+    }
+
+    /// The same, with results that take the place of what is there.
+    #[must_use]
+    pub fn with_existing(self, existing: Existing) -> Self {
+        Self { existing, ..self }
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.

@@ -19,6 +19,8 @@ pub trait Progress: Sync {
     fn remark(&self, text: &str);
     /// The step has ended.
     fn end(&self);
+    /// Something that the user should know at once: that another process is waited for, say.
+    fn notice(&self, _text: &str) {}
 }
 
 /// Progress that nobody watches.

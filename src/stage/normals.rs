@@ -69,7 +69,7 @@ impl Plan {
 
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe, context)? else {
             return self.model.report(Stage::Normals);
         };
         let description = self.measurement.description();
@@ -83,7 +83,7 @@ impl Plan {
         self.model.write_normals(tile.size, &normals)?;
         let (mean, spread_deg) = mean_and_spread(&normals);
         let report = Report { view, lights: description.lights.len(), mean, spread_deg };
-        self.model.finish(Stage::Normals, &self.recipe, &report)?;
+        self.model.finish(Stage::Normals, &self.recipe, &report, context)?;
         Ok(report)
     }
 }

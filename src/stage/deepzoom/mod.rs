@@ -142,7 +142,7 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
         "tile_side": side,
         "overlap": overlap,
     });
-    place.check(&recipe)?;
+    place.check(&recipe, context.existing)?;
     let pyramid = Pyramid { size: scene.size(), side, overlap };
     Ok(Plan { scene, pyramid, encoding: options.encoding, place, recipe })
 }
@@ -186,7 +186,7 @@ impl Plan {
             ))
             .hint("allow a larger --memory, or make smaller tiles by --tile-size")
         })?;
-        self.place.begin(&self.recipe)?;
+        self.place.begin(&self.recipe, context)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
         let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };

@@ -2,7 +2,7 @@
 
 use btfkit_formats::Contents;
 
-use super::Options;
+use super::{Options, Written};
 use crate::color::Transfer;
 use crate::error::Result;
 use crate::hdf5::Writer;
@@ -10,11 +10,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::store::measurement::Measurement;
 
-pub(super) fn write(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Vec<String>> {
+pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = measurement.description();
     let contents = Contents {
         format: "measurement store".to_owned(),
@@ -29,7 +25,8 @@ pub(super) fn write(
         assumptions: Vec::new(),
         remarks: Vec::new(),
     };
-    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?;
+    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?
+        .with_existing(context.existing);
     let whole = description.size.window();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     let codes = (description.size.texels() * description.lights.len()) as u64;
@@ -43,6 +40,6 @@ pub(super) fn write(
         context.progress.advance(1);
         Ok(())
     })?;
-    writer.finish()?;
-    Ok(Vec::new())
+    let made = writer.finish()?;
+    Ok((made, Vec::new()))
 }

@@ -9,7 +9,6 @@ mod pictures;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::{SampleType, Samples, f16};
-use serde::Serialize;
 
 use crate::color::Transfer;
 use crate::error::{Error, Result};
@@ -17,6 +16,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
+use crate::store::output::Made;
 
 /// What to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,18 +51,23 @@ pub struct Options {
 }
 
 /// What was written.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Report {
+    /// Whether it was there already.
+    pub made: Made,
     /// Bytes of all files.
     pub bytes: u64,
     /// What other programs will not like, a sentence each.
     pub warnings: Vec<String>,
 }
 
+/// Whether it was there already, and what other programs will not like.
+type Written = (Made, Vec<String>);
+
 /// Writes a whole measurement as an archive.
 ///
 /// # Errors
-/// A measurement that is not complete, or that the format cannot hold; an output that exists.
+/// A measurement that is not complete, or that the format cannot hold; [`crate::Kind::Recipe`] where other files are.
 pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
     let views = measurement.description().views.len();
     let done = measurement.views_done();
@@ -70,11 +75,7 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         let found = format!("{}: {done} of {views} views are there", measurement.path().display());
         return Err(Error::missing(found).hint("finish its import first"));
     }
-    if options.output.exists() {
-        return Err(Error::input(format!("{} exists", options.output.display()))
-            .hint("choose another name, or delete it"));
-    }
-    let warnings = match options.format {
+    let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
         Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,
         Format::Png => pictures::folder(measurement, options, pictures::Kind::Png, context)?,
@@ -84,14 +85,14 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         Format::Fmf => bonn::fmf(measurement, options, context)?,
     };
     context.progress.end();
-    Ok(Report { bytes: bytes_of(&options.output), warnings })
+    Ok(Report { made, bytes: bytes_of(&options.output), warnings })
 }
 
 #[cfg(feature = "hdf5")]
 use self::hdf5::write as hdf5;
 
 #[cfg(not(feature = "hdf5"))]
-fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Vec<String>> {
+fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Written> {
     Err(crate::hdf5::not_built_in(&options.output))
 }
 

@@ -13,6 +13,7 @@ use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
+use crate::store::output::Made;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
@@ -77,11 +78,11 @@ pub struct PlaneOptions {
 }
 
 /// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
-/// with its width only. Returns its size.
+/// with its width only. Returns its size, and whether it was there already.
 ///
 /// # Errors
 /// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
-pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<Size> {
+pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<(Size, Made)> {
     Ending::of(output)?;
     let mut scene = Scene::open(options, context)?;
     scene.expose(exposure);
@@ -91,16 +92,16 @@ pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_
     let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
-    read_ahead::with(context, in_flight, bands, read, |bands| {
+    let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
-        stream::write(output, size, scene.meaning(), |pixels| {
+        stream::write(output, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
             context.progress.advance(1);
             Ok(())
         })
     })?;
     context.progress.end();
-    Ok(size)
+    Ok((size, made))
 }
 
 /// The rows of a picture, out of bands.

@@ -328,9 +328,12 @@ fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> R
 fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
-    let how = taken.map_or(format!("after {} passes", report.passes.len()), |(name, texels)| {
-        format!("of {name}, where {texels} texels were clustered")
-    });
+    let passes = match (report.batches.len(), report.passes.len()) {
+        (0, all) => format!("after {all} passes"),
+        (batches, all) => format!("after {batches} passes over mini-batches and {all} over all texels"),
+    };
+    let how =
+        taken.map_or(passes, |(name, texels)| format!("of {name}, where {texels} texels were clustered"));
     tell.line(format!(
         "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
         report.clusters, report.representative_lightness_error

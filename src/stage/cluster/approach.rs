@@ -62,6 +62,15 @@ impl Plan {
         let mut trials = Trials::new(&points, method, self.options.seed);
         let clustering = context.install(|| trials.run(clusters, context))?;
         context.progress.end();
+        if let Some(last) = history.attempts.last().filter(|last| clustering.nearest.len() <= last.clusters) {
+            return Err(Error::usage(format!(
+                "{} clusters, as many as a sample of {} texels gives, leave a mean |dL*| of {:.3}",
+                last.clusters,
+                points.len(),
+                last.mean_lightness_error
+            ))
+            .hint("choose a larger --error or a larger --sample"));
+        }
         let state = self.state_of(clustering, history);
         passes.write_state(pass, self.brdf(), &state)?;
         Ok(state)

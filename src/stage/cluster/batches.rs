@@ -16,9 +16,6 @@ use crate::store::passes::{Found, History};
 use crate::texel::cluster::bounds::Centres;
 use crate::texel::cluster::lloyd::Pass;
 
-/// A centre rests on too few texels once its way in a pass is less than its uncertainty over this.
-const STILL: u64 = 1;
-
 /// Texels of the first batch for each of its sample. Texels of one chunk are alike, so that first centres from whole
 /// chunks miss what few chunks have.
 const SPREAD: usize = 8;
@@ -59,8 +56,10 @@ impl Plan {
             return Ok(blocks);
         }
         let model = self.model.path().display();
-        Err(Error::input(format!("{model}: clustering: got a mini-batch of {blocks} blocks, expected 1 to {all}"))
-            .hint("delete the folder `clustering` in the model and run the same command again"))
+        Err(Error::input(format!(
+            "{model}: clustering: got a mini-batch of {blocks} blocks, expected 1 to {all}"
+        ))
+        .hint("delete the folder `clustering` in the model and run the same command again"))
     }
 
     /// The batch of the next pass, after one over `blocks` blocks moved the centres from `before` [cluster, view, light]
@@ -80,7 +79,8 @@ impl Plan {
         if deadline.is_some_and(|deadline| Instant::now() >= deadline) {
             return None;
         }
-        let centres = Centres { arrangement: &self.arrangement, vectors: now, kernel: self.method(0, None).kernel };
+        let centres =
+            Centres { arrangement: &self.arrangement, vectors: now, kernel: self.method(0, None).kernel };
         let ways = centres.drifts(&self.arrangement.arranged(before));
         let (counts, _) = found.tally.parts();
         let clusters = ways.iter().zip(&found.distances).zip(counts);
@@ -95,12 +95,10 @@ impl Plan {
 /// Whether a centre went less far than chance lets it: a median of n values is off by 1.25 times their mean distance
 /// from it over the root of n (of a normal distribution, in the mean over directions).
 fn is_still(way: u64, distances: u64, texels: u32) -> bool {
-    // way STILL <= 1.25 (distances / texels) / sqrt(texels), squared; what is beyond u128 is no small way.
+    // way <= 1.25 (distances / texels) / sqrt(texels), squared; what is beyond u128 is no small way.
     let (way, texels) = (u128::from(way), u128::from(texels));
-    let still = std::env::var("STILL").ok().and_then(|s| s.parse().ok()).unwrap_or(STILL);
-    let left = (4 * u128::from(still)).checked_mul(way).and_then(|way| way.checked_mul(way));
-    let left = left.and_then(|left| left.checked_mul(texels.pow(3)));
-    left.is_some_and(|left| left <= 25 * u128::from(distances).pow(2))
+    let left = (16 * way).checked_mul(way).and_then(|left| left.checked_mul(texels.pow(3)));
+    left.is_some_and(|left| left <= u128::from(distances).pow(2).saturating_mul(25))
 }
 
 #[cfg(test)]

@@ -40,7 +40,8 @@ impl<'a> Stream<'a> {
         let texels = selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(0);
         let windows = |block: &Block| block.windows.iter().map(|window| window.size.texels()).sum();
         let windows: usize = selection.blocks().iter().map(windows).max().unwrap_or(0);
-        read_ahead::IN_FLIGHT * texels * arrangement.stride() + windows * arrangement.cosines().len() * arrangement.lights()
+        read_ahead::IN_FLIGHT * texels * arrangement.stride()
+            + windows * arrangement.cosines().len() * arrangement.lights()
     }
 
     /// Calls `work` with each block of `blocks` and its vectors [slot, stride], in their order, on the pool.

@@ -84,29 +84,28 @@ impl Measurement {
                 (rest, y) = (later, end);
             }
         }
-        let read_band =
-            |codec: &mut Option<(ChunkCodec, Vec<u8>)>,
-             (window, rows, band): (&Window, Range<usize>, &mut [u8])|
-             -> Result<()> {
-                let (codec, texels) = match codec {
-                    Some(codec) => codec,
-                    none => none.insert((ChunkCodec::new(self.codec, chunk)?, vec![0; chunk.bytes()])),
-                };
-                let row_bytes = window.size.width * texel_bytes;
-                let mut x = window.x;
-                while x < window.x + window.size.width {
-                    let end = ((x / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.x + window.size.width);
-                    self.decode(&shards, array, view, [rows.start, x], codec, texels)?;
-                    let columns = (end - x) * texel_bytes;
-                    for (number, row) in rows.clone().enumerate() {
-                        let from = (row % CHUNK_SIDE * CHUNK_SIDE + x % CHUNK_SIDE) * texel_bytes;
-                        let to = number * row_bytes + (x - window.x) * texel_bytes;
-                        band[to..to + columns].copy_from_slice(&texels[from..from + columns]);
-                    }
-                    x = end;
-                }
-                Ok(())
+        let read_band = |codec: &mut Option<(ChunkCodec, Vec<u8>)>,
+                         (window, rows, band): (&Window, Range<usize>, &mut [u8])|
+         -> Result<()> {
+            let (codec, texels) = match codec {
+                Some(codec) => codec,
+                none => none.insert((ChunkCodec::new(self.codec, chunk)?, vec![0; chunk.bytes()])),
             };
+            let row_bytes = window.size.width * texel_bytes;
+            let mut x = window.x;
+            while x < window.x + window.size.width {
+                let end = ((x / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.x + window.size.width);
+                self.decode(&shards, array, view, [rows.start, x], codec, texels)?;
+                let columns = (end - x) * texel_bytes;
+                for (number, row) in rows.clone().enumerate() {
+                    let from = (row % CHUNK_SIDE * CHUNK_SIDE + x % CHUNK_SIDE) * texel_bytes;
+                    let to = number * row_bytes + (x - window.x) * texel_bytes;
+                    band[to..to + columns].copy_from_slice(&texels[from..from + columns]);
+                }
+                x = end;
+            }
+            Ok(())
+        };
         bands.into_par_iter().try_for_each_init(|| None, read_band)?;
         Ok(bytes)
     }

@@ -38,6 +38,9 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/option_effects.rs"]
+#[allow(dead_code)] // the program's own tests read the rest
+mod option_effects;
 #[path = "behaviour/paper_bytes.rs"]
 mod paper_bytes;
 #[path = "behaviour/pictures.rs"]
@@ -46,6 +49,8 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/safety.rs"]
+mod safety;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

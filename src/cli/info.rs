@@ -61,7 +61,10 @@ impl Info {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         let path = self.path();
         let store = path.join("zarr.json").exists();
-        let rows = match store.then(|| Store::at(path).attributes()).transpose()?.flatten() {
+        let rows = match store
+            .then(|| Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND]))
+            .transpose()?
+        {
             None => self.archive(context)?,
             Some(attributes) => match attributes.get("kind").and_then(Value::as_str) {
                 Some(measurement::KIND) => self.measurement()?,
@@ -131,12 +134,11 @@ impl Info {
     fn enlarged(&self) -> Result<Vec<Vec<String>>> {
         let enlarged = Enlarged::open(self.path())?;
         let shards = enlarged.shards();
-        let is_done = |&n: &usize| enlarged.has_shard(n / shards.width, n % shards.width);
-        let done = (0..shards.texels()).filter(is_done).count();
+        let done = enlarged.shards_done();
         Ok(vec![
             row!["kind", enlarged::KIND],
             row!["size", enlarged.size()],
-            row!["method", format!("{:?}", enlarged.method()?).to_lowercase()],
+            row!["method", format!("{:?}", enlarged.method()).to_lowercase()],
             row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
             row!["shards done", format!("{done} of {}", shards.texels())],
         ])

@@ -13,6 +13,7 @@ mod image;
 mod import;
 mod info;
 mod judge;
+mod number;
 mod progress;
 mod sample;
 mod scene;
@@ -28,6 +29,7 @@ use std::sync::atomic::AtomicBool;
 
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
+use btfkit::run::budget::{address_space_left, cannot_start};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::store::output::{Existing, Made};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
@@ -45,6 +47,9 @@ Examples:
 Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input not there yet,
 74 input/output, 75 stopped early (run the same command again).";
 
+/// More threads than any machine has cores that share a memory.
+const MOST_THREADS: i64 = 1024;
+
 /// Turns a measured Bidirectional Texture Function into a small model that covers any surface.
 #[derive(Parser)]
 #[command(name = "btf", version, after_help = EXAMPLES)]
@@ -57,9 +62,9 @@ struct Cli {
 
 #[derive(Args)]
 struct Common {
-    /// Threads to use [default: all cores]
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
+    /// Threads to use, from 1 to 1024 [default: all cores]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
+    threads: Option<u32>,
     /// Memory to use, such as 512MiB or 2GiB
     #[arg(long, global = true, default_value = "2GiB", value_parser = parse_bytes, value_name = "SIZE")]
     memory: u64,
@@ -110,18 +115,22 @@ enum Command {
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
     let cli = Cli::parse();
-    let threads = cli
-        .common
-        .threads
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-        .max(1);
-    // zarrs decodes chunks on the global pool.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let threads = cli.common.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        |threads| threads as usize,
+    );
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
+    // A failed allocation ends in an abort; what is left lies in temporary files and is swept. With an exit code of ours
+    // schedulers need not take it for a bug that leaves a core.
+    let _ = signal_hook::flag::register_conditional_shutdown(
+        signal_hook::consts::SIGABRT,
+        1,
+        Arc::new(AtomicBool::new(true)),
+    );
     // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
@@ -130,7 +139,12 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
-    let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
+    let memory = cli.common.memory.min(address_space_left().unwrap_or(u64::MAX));
+    // zarrs decodes chunks on the global pool.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let result = pool
+        .map_err(|error| cannot_start(threads, &error))
+        .and_then(|()| Context::new(progress.as_ref(), &stop, threads, memory))
         .map(|context| {
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
@@ -242,4 +256,52 @@ fn found(made: Made) -> &'static str {
 /// Bytes for people.
 fn bytes_text(bytes: u64) -> String {
     indicatif::HumanBytes(bytes).to_string()
+}
+
+#[cfg(test)]
+#[path = "../../tests/behaviour/option_effects.rs"]
+mod option_effects;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory;
+
+    use super::option_effects::{COMMON, Effect, RECIPES, WITHOUT};
+    use super::*;
+
+    /// An option that is not in the table of effects may be forgotten in a recipe: so it does not pass.
+    #[test]
+    fn of_every_option_it_is_said_whether_the_result_depends_on_it() {
+        let own = |name: &str| {
+            name != "help" && name != "version" && !COMMON.iter().any(|(common, _)| *common == name)
+        };
+        let common: BTreeSet<String> =
+            Cli::command().get_arguments().map(|a| a.get_id().to_string()).collect();
+        for (name, _) in COMMON {
+            assert!(common.contains(*name), "--{name} is no option of all commands");
+        }
+        assert!(
+            common.iter().all(|name| !own(name)),
+            "an option of all commands is not in the table: {common:?}"
+        );
+        for command in Cli::command().get_subcommands() {
+            let name = command.get_name();
+            if WITHOUT.contains(&name) {
+                continue;
+            }
+            let told = RECIPES.iter().find(|of| of.command == name).map(|of| of.options);
+            let told: BTreeSet<&str> = told.unwrap_or_default().iter().map(|(option, _)| *option).collect();
+            let found: BTreeSet<&str> =
+                command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
+            assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");
+        }
+        let reasons = RECIPES.iter().flat_map(|of| of.options).filter_map(|(_, effect)| match effect {
+            Effect::Apart(reason) => Some(*reason),
+            Effect::Changes(arguments) | Effect::Keeps(arguments) => arguments.first().copied(),
+        });
+        assert!(reasons.chain(COMMON.iter().map(|(_, reason)| *reason)).all(|reason| !reason.is_empty()));
+    }
 }

@@ -1,9 +1,8 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Result};
+use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
-use btfkit::stage::verify;
-use btfkit::store::measurement::Measurement;
+use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
 use btfkit::text::escaped;
 use clap::Args;
 
@@ -11,16 +10,24 @@ use super::Tell;
 use super::source::SourceArgs;
 use super::table::{row, table};
 
-/// Is a measurement whole and undamaged? Names each damaged chunk; --source compares with the archive
+/// Is a store or a pyramid whole and undamaged? Names what is not; --source compares a measurement with its archive
 #[derive(Args)]
 #[command(after_help = "\
+Everything is read: every chunk of every array, what the metadata must say, and what follows from what.
+
 Examples:
   btf verify wood.zarr
   btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
-Exit code 65 if something is damaged or different, 66 if views are missing.")]
+  btf verify wood.model.zarr
+  btf verify wood-4k.zarr                           with its model, if that lies beside it; else --model names it
+  btf verify wood-4k.dzi                            a Deep Zoom pyramid
+Exit code 65 if something is damaged or different, 66 if something is missing.")]
 pub(super) struct Verify {
-    /// A measurement
+    /// A measurement, a model, an enlarged index, or a Deep Zoom pyramid (its .dzi, or the folder of its tiles)
     store: PathBuf,
+    /// The model of an enlarged index [default: beside it, under the name it had]
+    #[arg(long)]
+    model: Option<PathBuf>,
     /// The archive that it was made of; may be given several times for one in pieces
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
@@ -33,62 +40,119 @@ pub(super) struct Verify {
 
 impl Verify {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let measurement = Measurement::open(&self.store)?;
-        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
-        let report = verify::run(&measurement, source.as_deref(), context)?;
+        let found = self.look(&self.store, context)?;
         if self.json {
-            let report = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
+            let report = serde_json::to_value(&found).map_err(|error| Error::internal(error.to_string()))?;
             tell.plan(&report)?;
         } else {
-            tell.text(&self.told(&report, measurement.description().views.len()));
+            tell.text(&told(&found));
         }
-        self.judge(&report)
+        judge(&self.store, &found)
     }
 
-    fn told(&self, report: &verify::Report, views: usize) -> String {
-        let mut rows = vec![
-            row!["views", format!("{} of {views}", report.views_found)],
-            row!["damaged chunks", report.damaged.len()],
-            row!["samples above white", report.samples.clipped],
-            row!["samples not finite", report.samples.not_finite],
-            row!["samples negative", report.samples.negative],
-        ];
-        if let Some(different) = report.different {
-            rows.push(row!["samples unlike the archive's", different]);
-        }
-        let mut text = table(&rows);
-        for damage in &report.damaged {
-            let [y, x] = damage.texel;
-            text.push_str(&format!(
-                "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
-                damage.array,
-                damage.view,
-                escaped(&damage.file),
-                escaped(&damage.what)
-            ));
-        }
-        for (view, light) in &report.different_images {
-            text.push_str(&format!("\ndifferent: view {view}, light {light}"));
-        }
-        text
+    /// Looks at one store or pyramid.
+    fn look(&self, path: &Path, context: &Context<'_>) -> Result<Found> {
+        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
+        verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
     }
+}
 
-    fn judge(&self, report: &verify::Report) -> Result<()> {
-        let store = self.store.display();
-        if !report.damaged.is_empty() {
-            let error = Error::input(format!("{store}: {} damaged chunks", report.damaged.len()));
-            return Err(error.hint("delete the files named and import again: only their views are read"));
+/// What was found, for people.
+fn told(found: &Found) -> String {
+    let (mut text, findings, notes) = match found {
+        Found::Measurement { views, report } => {
+            (of_measurement(report, *views), &report.findings, &report.notes)
         }
-        match report.different {
-            Some(count) if count > 0 => {
-                return Err(Error::input(format!("{store}: {count} samples are not those of the archive")));
+        Found::Other(report) => {
+            let mut rows = vec![row!["kind", report.kind]];
+            rows.extend(report.checked.iter().map(|(name, what)| row![name, what]));
+            (table(&rows), &report.findings, &report.notes)
+        }
+    };
+    for Finding { part, what, todo, missing } in findings {
+        let word = if *missing { "missing" } else { "damaged" };
+        text.push_str(&format!("\n{word}: {}: {}", escaped(part), escaped(what)));
+        if let Some(todo) = todo {
+            text.push_str(&format!("\n  {}", escaped(todo)));
+        }
+    }
+    for note in notes {
+        text.push_str(&format!("\nnote: {}", escaped(note)));
+    }
+    if judge(Path::new(""), found).is_ok() {
+        text.push_str("\nwhole and undamaged");
+    }
+    text
+}
+
+fn of_measurement(report: &measurement::Report, views: usize) -> String {
+    let mut rows = vec![
+        row!["kind", "measurement"],
+        row!["views", format!("{} of {views}", report.views_found)],
+        row!["damaged chunks", report.damaged.len()],
+        row!["samples above white", report.samples.clipped],
+        row!["samples not finite", report.samples.not_finite],
+        row!["samples negative", report.samples.negative],
+    ];
+    if let Some(different) = report.different {
+        rows.push(row!["samples unlike the archive's", different]);
+    }
+    let mut text = table(&rows);
+    for damage in &report.damaged {
+        let [y, x] = damage.texel;
+        text.push_str(&format!(
+            "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
+            damage.array,
+            damage.view,
+            escaped(&damage.file),
+            escaped(&damage.what)
+        ));
+    }
+    for (view, light) in &report.different_images {
+        text.push_str(&format!("\ndifferent: view {view}, light {light}"));
+    }
+    text
+}
+
+/// The error that a report amounts to, if it does.
+fn judge(store: &Path, found: &Found) -> Result<()> {
+    let store = store.display();
+    let findings = match found {
+        Found::Measurement { report, .. } => {
+            if !report.damaged.is_empty() {
+                let error = Error::input(format!("{store}: {} damaged chunks", report.damaged.len()));
+                let advice = "delete the files named and import again, if you have the archive: only their views are read";
+                return Err(error.hint(advice));
             }
-            _ => {}
+            match report.different {
+                Some(count) if count > 0 => {
+                    let what = format!("{store}: {count} samples are not those of the archive");
+                    return Err(Error::input(what));
+                }
+                _ => {}
+            }
+            if !report.views_missing.is_empty() {
+                let error =
+                    Error::missing(format!("{store}: {} views are missing", report.views_missing.len()));
+                return Err(
+                    error.hint("run the command that makes this store again; it goes on where it stopped")
+                );
+            }
+            &report.findings
         }
-        if report.views_missing.is_empty() {
-            return Ok(());
-        }
-        let error = Error::missing(format!("{store}: {} views are missing", report.views_missing.len()));
-        Err(error.hint("run the command that makes this store again; it goes on where it stopped"))
-    }
+        Found::Other(report) => &report.findings,
+    };
+    let damaged = findings.iter().find(|finding| !finding.missing);
+    let Some(first) = damaged.or(findings.first()) else { return Ok(()) };
+    let kind = if damaged.is_some() { Kind::Input } else { Kind::Missing };
+    let more = match findings.len() {
+        1 => String::new(),
+        count => format!(" (and {} more)", count - 1),
+    };
+    let word = if damaged.is_some() { "damaged" } else { "not whole" };
+    let error = Error::new(kind, format!("{store}: {word}: {}: {}{more}", first.part, first.what));
+    Err(match &first.todo {
+        Some(todo) => error.hint(todo.clone()),
+        None => error,
+    })
 }

@@ -181,18 +181,19 @@ impl Plan<'_> {
         let mut samples = Remarkable::default();
         let mut problems = Vec::new();
         // One view is written while the next is decoded; the threads share the work of each.
-        let read = |&view: &usize| match read_view(self.source, view, context) {
+        let read = |&view: &usize| match read_view(self.source, view, self.options.white, context) {
             // A broken image does not keep the others from being looked at: all are named at the end.
             Err(error) if error.kind() == Kind::Input => Ok((view, Err(error.to_string()))),
             images => Ok((view, Ok(images?))),
         };
         read_ahead::for_each(context, in_flight, &missing, read, |(view, images)| {
             match images {
-                Ok(images) => {
-                    samples += context.install(|| {
+                Ok((images, before)) => {
+                    let stored = context.install(|| {
                         let images = Images::new(size, channels, sample_type, images)?;
                         measurement.write_view(view, &images, &codes)
                     })?;
+                    samples += before.unwrap_or(stored);
                 }
                 Err(problem) => problems.push(problem),
             }
@@ -203,6 +204,7 @@ impl Plan<'_> {
             return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));
         }
+        measurement.finish(context)?;
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
 }
@@ -210,11 +212,17 @@ impl Plan<'_> {
 /// Groups of images of a view: lights, and their samples [light, y, x, channel].
 pub(crate) type Groups = Vec<(std::ops::Range<usize>, Samples)>;
 
-/// The images of a view, read on the threads of the pool that this is called in.
+/// The images of a view, read on the threads of the pool that this is called in; and what was found in them before they
+/// were converted, where they were.
 ///
 /// # Errors
 /// Names every unusable image of the view.
-pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>) -> Result<Groups> {
+pub(crate) fn read_view(
+    source: &dyn Source,
+    view: usize,
+    white: f64,
+    context: &Context<'_>,
+) -> Result<(Groups, Option<Remarkable>)> {
     let lights = source.contents().lights.len();
     let step = source.lights_at_once().clamp(1, lights);
     let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
@@ -222,7 +230,7 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
         .into_par_iter()
         .map(|group| {
             context.check_stop()?;
-            let samples = source.read_images(view, group.clone());
+            let samples = source.read_counted(view, group.clone(), white);
             context.progress.advance(group.len() as u64);
             samples.map(|samples| (group, samples))
         })
@@ -230,15 +238,21 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
     context.check_stop()?;
     let mut problems = Vec::new();
     let mut images = Vec::new();
+    let mut before: Option<Remarkable> = None;
     for group in read {
         match group {
-            Ok(group) => images.push(group),
+            Ok((group, (samples, found))) => {
+                images.push((group, samples));
+                if let Some(found) = found {
+                    *before.get_or_insert_default() += found;
+                }
+            }
             Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
     }
     if problems.is_empty() {
-        Ok(images)
+        Ok((images, before))
     } else {
         Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
     }

@@ -13,6 +13,9 @@ const PROGRAM_BYTES: usize = 64 << 20;
 /// Most bytes of the sample's vectors, unless told otherwise. Fixed, so that a result does not depend on memory.
 const SAMPLE_BYTES: usize = 192 << 20;
 
+/// Blocks' worth of memory that the allocator cannot give back for lying between blocks that are kept.
+const SCATTERED_BLOCKS: usize = 3;
+
 /// Texels whose distances to all centres a thread holds.
 const TABLE_TEXELS: usize = 64;
 
@@ -43,7 +46,7 @@ impl Plan {
     /// No fewer texels than clusters that are asked for.
     fn least_sample(&self) -> usize {
         match self.options.amount {
-            Amount::Clusters(_) | Amount::Ratio(_) => self.most_clusters,
+            Amount::Usual | Amount::Clusters(_) | Amount::Ratio(_) => self.most_clusters,
             Amount::Error(_) => 1,
         }
     }
@@ -87,7 +90,7 @@ impl Budget {
             clusters,
             sample_columns: columns(&sample),
             columns: columns(&all),
-            kept_blocks: left / (block * plan.arrangement.stride()),
+            kept_blocks: (left / (block * plan.arrangement.stride())).saturating_sub(SCATTERED_BLOCKS),
         })
     }
 

@@ -107,12 +107,7 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
-        let attributes = Store::at(path).attributes()?.ok_or_else(|| {
-            Error::missing(format!(
-                "{}: no store here, expected a measurement, a model or an enlarged index",
-                path.display()
-            ))
-        })?;
+        let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
         let digest = attributes.get("digest").cloned().unwrap_or_default();
         let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
         if options.plane.is_some() && kind != model::KIND {
@@ -409,16 +404,12 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
 
 /// The model that an enlarged index at a path refers to; where it is not named, it lies beside it.
 pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) -> Result<Model> {
-    let attributes = enlarged.attributes()?;
-    let text = |value: Option<&Value>| value.and_then(Value::as_str).unwrap_or_default().to_owned();
     let path = match named {
         Some(path) => path.to_owned(),
-        None => beside(place, &text(attributes.get("model_name"))),
+        None => beside(place, enlarged.model_name().unwrap_or_default()),
     };
     let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
-    if text(attributes.get("recipe").and_then(|recipe| recipe.get("model")))
-        != model.digest_of(enlarged.method()?.stages())?
-    {
+    if enlarged.recipe().model != model.digest_of(enlarged.method().stages())? {
         return Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
             place.display(),

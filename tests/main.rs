@@ -19,6 +19,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/curve.rs"]
 mod curve;
+#[path = "behaviour/damaged_stores.rs"]
+mod damaged_stores;
 #[path = "behaviour/deepzoom.rs"]
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]

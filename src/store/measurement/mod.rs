@@ -233,6 +233,11 @@ impl Measurement {
         &self.description
     }
 
+    /// How its chunks are packed.
+    pub fn codec(&self) -> Chain {
+        self.codec
+    }
+
     /// Digest of the recipe that made it.
     pub fn digest(&self) -> &str {
         &self.digest

@@ -175,7 +175,7 @@ impl Plan<'_> {
         context.progress.begin("import", self.images(), Counted::Items("images"));
         context.progress.advance((found.len() * self.description.lights.len()) as u64);
         let codes = self.description.codes()?;
-        let in_flight = read_ahead::in_flight(context.memory_bytes, self.unit_bytes());
+        let in_flight = read_ahead::in_flight(context.work_bytes(), self.unit_bytes());
         let Description { size, sample_type, .. } = self.description;
         let channels = self.description.n_channels();
         let mut samples = Remarkable::default();

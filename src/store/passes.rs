@@ -103,7 +103,8 @@ pub struct Found {
 impl Found {
     /// Sum of the distances.
     pub fn objective(&self) -> u64 {
-        self.distances.iter().sum()
+        // What lies on disk may be anything.
+        self.distances.iter().fold(0, |sum, &distance| sum.saturating_add(distance))
     }
 
     /// Together with what was found in the part that follows.
@@ -113,7 +114,8 @@ impl Found {
         self.tally.merge(&next.tally);
         self.nearest = nearer(self.nearest, next.nearest);
         self.farthest.add(next.farthest.texels().iter().copied());
-        self.distances.iter_mut().zip(next.distances).for_each(|(sum, more)| *sum += more);
+        let sums = self.distances.iter_mut().zip(next.distances);
+        sums.for_each(|(sum, more)| *sum = sum.saturating_add(more));
         self.moved += next.moved;
         self
     }

@@ -229,8 +229,9 @@ fn a_sample_and_passes_come_within_a_hundredth_of_all_texels_in_memory() {
 #[test]
 fn the_fewest_clusters_for_an_error_and_the_most_for_a_ratio() {
     let folder = tempfile::tempdir().unwrap();
-    let minibatch = &["--sample", "300", "--first", "minibatch"];
-    for (name, sample) in [("memory", &[][..]), ("streamed", &["--sample", "700"]), ("minibatch", minibatch)]
+    let minibatch = ["--sample", "300", "--first", "minibatch"];
+    for (name, sample) in
+        [("memory", &[][..]), ("streamed", &["--sample", "700"][..]), ("minibatch", &minibatch[..])]
     {
         let model = plane(folder.path(), name);
         let measurement = fixture().measurement();

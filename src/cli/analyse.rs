@@ -4,7 +4,7 @@ use std::time::Duration;
 use btfkit::error::{Error, Result};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
-use btfkit::stage::cluster::{Amount, Step, Stepped};
+use btfkit::stage::cluster::{Amount, First, Step, Stepped};
 use btfkit::stage::import::Shard;
 use btfkit::stage::{cluster, compare, image, normals};
 use btfkit::store::measurement::Measurement;
@@ -40,7 +40,12 @@ struct ClusterOptions {
     /// Least relative gain of the objective that is worth another pass
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
     tolerance: f64,
-    /// Texels to cluster in memory before all others are passed over [default: as many as 192 MiB hold]
+    /// Where the centres come from that passes over all texels begin with [default: all texels where 192 MiB hold
+    /// them, else sample]
+    #[arg(long, value_enum)]
+    first: Option<FirstName>,
+    /// Texels of the sample, clustered in memory [default: as many as 192 MiB hold; of a mini-batch 16384 or eight a
+    /// cluster]
     #[arg(long, value_name = "TEXELS")]
     sample: Option<usize>,
     /// Draw first centres so many times and go on with the best
@@ -50,7 +55,7 @@ struct ClusterOptions {
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile holds this one
-    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "sample", "restarts", "time"])]
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "first", "sample", "restarts", "time"])]
     clusters_of: Option<PathBuf>,
 }
 
@@ -60,6 +65,14 @@ enum Centre {
     Median,
     /// The textbook's K-means
     Mean,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FirstName {
+    /// A random sample of the texels, as large as memory is set aside for
+    Sample,
+    /// Batches of chunks drawn over the whole store: a sample of the first, then passes over batches that double
+    Minibatch,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -293,6 +306,10 @@ fn cluster_plan(
         amount,
         centre,
         limits,
+        first: options.first.map(|first| match first {
+            FirstName::Sample => First::Sample,
+            FirstName::Minibatch => First::Minibatch,
+        }),
         sample: options.sample,
         restarts: options.restarts,
         seed,
@@ -311,9 +328,12 @@ fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> R
 fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
-    let how = taken.map_or(format!("after {} passes", report.passes.len()), |(name, texels)| {
-        format!("of {name}, where {texels} texels were clustered")
-    });
+    let passes = match (report.batches.len(), report.passes.len()) {
+        (0, all) => format!("after {all} passes"),
+        (batches, all) => format!("after {batches} passes over mini-batches and {all} over all texels"),
+    };
+    let how =
+        taken.map_or(passes, |(name, texels)| format!("of {name}, where {texels} texels were clustered"));
     tell.line(format!(
         "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
         report.clusters, report.representative_lightness_error

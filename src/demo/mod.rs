@@ -218,6 +218,7 @@ fn analyse(
             model: model.clone(),
             amount: Amount::Clusters(settings.clusters),
             centre: CentreRule::Median,
+            first: None,
             sample: None,
             restarts: 1,
             time: None,

@@ -114,7 +114,7 @@ pub(crate) fn of_window(
     };
     let mut normals = Vec::with_capacity(window.size.texels());
     let band_bytes = (BAND_ROWS * window.size.width * description.texel_bytes()) as u64;
-    let in_flight = read_ahead::in_flight(context.memory_bytes, band_bytes);
+    let in_flight = read_ahead::in_flight(context.work_bytes(), band_bytes);
     let read = |top: usize| {
         let rows = BAND_ROWS.min(window.size.height - top);
         let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };

@@ -33,5 +33,6 @@ pub mod stage;
 pub mod store;
 pub mod texel;
 pub mod views;
+pub mod words;
 
 pub use error::{Error, Kind, Result};

@@ -38,8 +38,12 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/many.rs"]
+mod many;
 #[path = "behaviour/paper_bytes.rs"]
 mod paper_bytes;
+#[path = "behaviour/picture_formats.rs"]
+mod picture_formats;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]

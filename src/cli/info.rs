@@ -12,6 +12,7 @@ use btfkit_formats::Direction;
 use clap::Args;
 use serde_json::Value;
 
+use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, bytes_text};
@@ -26,11 +27,15 @@ Archives are told apart by their content:
 Examples:
   btf info UBO_WOOD256.zip
   btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
-  btf info wood.zarr")]
+  btf info wood.zarr
+  btf info archives/*                               a line each, and a count")]
 pub(super) struct Info {
-    /// An archive, in pieces perhaps, or a store
+    /// Archives and stores; of several each has a line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
+    /// The archives are pieces of one measurement
+    #[arg(long)]
+    pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
 }
@@ -58,28 +63,34 @@ fn described(description: &Description) -> Vec<Vec<String>> {
 }
 
 impl Info {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let path = self.path();
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        if self.paths.len() > 1 && !self.pieces {
+            let name = |path: &PathBuf| path.display().to_string();
+            return each(&self.paths, name, false, context, tell, |path| {
+                Ok((Line::Text(in_short(&self.rows(std::slice::from_ref(path), context)?)), None))
+            });
+        }
+        tell.line(table(&self.rows(&self.paths, context)?));
+        Ok(Ended::Done)
+    }
+
+    /// What is to be told of one input, which may lie in pieces.
+    fn rows(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Vec<Vec<String>>> {
+        let path = paths.first().map_or(Path::new(""), PathBuf::as_path);
         let store = path.join("zarr.json").exists();
-        let rows = match store.then(|| Store::at(path).attributes()).transpose()?.flatten() {
-            None => self.archive(context)?,
+        match store.then(|| Store::at(path).attributes()).transpose()?.flatten() {
+            None => self.archive(paths, context),
             Some(attributes) => match attributes.get("kind").and_then(Value::as_str) {
-                Some(measurement::KIND) => self.measurement()?,
-                Some(model::KIND) => self.model()?,
-                Some(enlarged::KIND) => self.enlarged()?,
-                kind => vec![row!["kind", kind.unwrap_or("unknown")]],
+                Some(measurement::KIND) => measurement(path),
+                Some(model::KIND) => model(path),
+                Some(enlarged::KIND) => enlarged(path),
+                kind => Ok(vec![row!["kind", kind.unwrap_or("unknown")]]),
             },
-        };
-        tell.line(table(&rows));
-        Ok(())
+        }
     }
 
-    fn path(&self) -> &Path {
-        self.paths.first().map_or(Path::new(""), PathBuf::as_path)
-    }
-
-    fn archive(&self, context: &Context<'_>) -> Result<Vec<Vec<String>>> {
-        let source = self.source.open(&self.paths)?;
+    fn archive(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Vec<Vec<String>>> {
+        let source = self.source.open(paths)?;
         let contents = source.contents();
         let description = import::describe(source.as_ref(), 1.0);
         let mut rows = vec![row!["kind", format!("archive, {}", contents.format)]];
@@ -93,52 +104,68 @@ impl Info {
         rows.extend(contents.assumptions.iter().map(|assumption| row!["assumed", assumption]));
         Ok(rows)
     }
+}
 
-    fn measurement(&self) -> Result<Vec<Vec<String>>> {
-        let measurement = Measurement::open(self.path())?;
-        let description = measurement.description();
-        let mut rows = vec![row!["kind", measurement::KIND]];
-        rows.extend(described(description));
-        rows.push(row!["white", description.white]);
-        rows.push(row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())]);
-        let attributes = measurement.attributes()?;
-        let assumptions = attributes.get("assumptions").and_then(Value::as_array);
-        let texts = assumptions.into_iter().flatten().filter_map(Value::as_str);
-        rows.extend(texts.map(|assumption| row!["assumed", assumption]));
-        Ok(rows)
-    }
-
-    fn model(&self) -> Result<Vec<Vec<String>>> {
-        let model = Model::open(self.path())?;
-        let mut rows = vec![row!["kind", model::KIND]];
-        for stage in [Stage::Tile, Stage::Cluster, Stage::Normals, Stage::Fit, Stage::Appearance] {
-            let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
-            rows.push(row![stage.name(), done]);
+/// What tells an input apart from others, of what is told of it.
+fn in_short(rows: &[Vec<String>]) -> String {
+    const TOLD: [&str; 6] = ["views", "lights", "size", "views done", "method", "shards done"];
+    let told = rows.iter().filter_map(|row| match row.as_slice() {
+        [name, value] if name == "kind" => Some(value.clone()),
+        [name, value] if name == "size" => Some(value.clone()),
+        [name, value] if TOLD.contains(&name.as_str()) => {
+            let value = value.split_once(',').map_or(value.as_str(), |(first, _)| first);
+            Some(format!("{name} {value}"))
         }
-        if model.stage(Stage::Cluster)?.is_some() {
-            let report: cluster::Report = model.report(Stage::Cluster)?;
-            for (number, pass) in report.passes.iter().enumerate() {
-                let found = format!(
-                    "mean weighted |dL*| {:.4}, {} texels moved",
-                    pass.mean_lightness_error, pass.moved
-                );
-                rows.push(row![format!("  pass {}", number + 1), found]);
-            }
+        [name, value] if Stage::ALL.iter().any(|stage| stage.name() == name) => {
+            Some(format!("{name} {value}"))
         }
-        Ok(rows)
-    }
+        _ => None,
+    });
+    told.collect::<Vec<_>>().join(", ")
+}
 
-    fn enlarged(&self) -> Result<Vec<Vec<String>>> {
-        let enlarged = Enlarged::open(self.path())?;
-        let shards = enlarged.shards();
-        let is_done = |&n: &usize| enlarged.has_shard(n / shards.width, n % shards.width);
-        let done = (0..shards.texels()).filter(is_done).count();
-        Ok(vec![
-            row!["kind", enlarged::KIND],
-            row!["size", enlarged.size()],
-            row!["method", format!("{:?}", enlarged.method()?).to_lowercase()],
-            row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
-            row!["shards done", format!("{done} of {}", shards.texels())],
-        ])
+fn measurement(path: &Path) -> Result<Vec<Vec<String>>> {
+    let measurement = Measurement::open(path)?;
+    let description = measurement.description();
+    let mut rows = vec![row!["kind", measurement::KIND]];
+    rows.extend(described(description));
+    rows.push(row!["white", description.white]);
+    rows.push(row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())]);
+    let attributes = measurement.attributes()?;
+    let assumptions = attributes.get("assumptions").and_then(Value::as_array);
+    let texts = assumptions.into_iter().flatten().filter_map(Value::as_str);
+    rows.extend(texts.map(|assumption| row!["assumed", assumption]));
+    Ok(rows)
+}
+
+fn model(path: &Path) -> Result<Vec<Vec<String>>> {
+    let model = Model::open(path)?;
+    let mut rows = vec![row!["kind", model::KIND]];
+    for stage in Stage::ALL {
+        let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
+        rows.push(row![stage.name(), done]);
     }
+    if model.stage(Stage::Cluster)?.is_some() {
+        let report: cluster::Report = model.report(Stage::Cluster)?;
+        for (number, pass) in report.passes.iter().enumerate() {
+            let found =
+                format!("mean weighted |dL*| {:.4}, {} texels moved", pass.mean_lightness_error, pass.moved);
+            rows.push(row![format!("  pass {}", number + 1), found]);
+        }
+    }
+    Ok(rows)
+}
+
+fn enlarged(path: &Path) -> Result<Vec<Vec<String>>> {
+    let enlarged = Enlarged::open(path)?;
+    let shards = enlarged.shards();
+    let is_done = |&n: &usize| enlarged.has_shard(n / shards.width, n % shards.width);
+    let done = (0..shards.texels()).filter(is_done).count();
+    Ok(vec![
+        row!["kind", enlarged::KIND],
+        row!["size", enlarged.size()],
+        row!["method", format!("{:?}", enlarged.method()?).to_lowercase()],
+        row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
+        row!["shards done", format!("{done} of {}", shards.texels())],
+    ])
 }

@@ -30,11 +30,11 @@ pub(super) struct Judge {
     /// The model of an enlarged index [default: beside it, under the name it had]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT
-    #[arg(long)]
+    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
+    #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
     /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the directions]
-    #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair)]
+    #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]
     #[arg(long, value_name = "N")]
@@ -42,15 +42,15 @@ pub(super) struct Judge {
     /// Write all figures to a JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the pictures that were judged, side by side
-    #[arg(long, value_name = "FILE.png")]
+    /// Write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
+    #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
 }
 
 impl Judge {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         if let Some(path) = &self.sheet {
-            Ending::of(path)?;
+            Ending::of(path, &Ending::DISPLAY)?;
         }
         let (report, sheet) = judge::run(
             &judge::Options {

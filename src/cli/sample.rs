@@ -23,7 +23,7 @@ pub(super) struct Sample {
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
     /// Size of its images, WIDTHxHEIGHT
-    #[arg(long, default_value = "128x128")]
+    #[arg(long, default_value = "128x128", allow_hyphen_values = true)]
     size: Size,
     /// Number of views; 81 are those of UBO2003
     #[arg(long, default_value_t = 81)]

@@ -42,6 +42,9 @@ pub enum Stage {
 }
 
 impl Stage {
+    /// All of them, in their order.
+    pub const ALL: [Self; 5] = [Self::Tile, Self::Cluster, Self::Normals, Self::Fit, Self::Appearance];
+
     /// Its name, as a command and as an entry in the attributes.
     pub fn name(self) -> &'static str {
         match self {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
-use crate::picture::{Ending, Picture, stream};
+use crate::picture::{Encoding, Picture, stream};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::{Area, Size, Window};
@@ -75,22 +75,32 @@ pub struct PlaneOptions {
     pub jitter: Option<u32>,
 }
 
-/// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
-/// with its width only. Returns its size.
+/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size.
 ///
 /// # Errors
-/// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
-pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<Size> {
-    Ending::of(output)?;
+/// A window that does not lie within the plane, a size that the format or the memory does not hold, and those of
+/// reading and writing.
+pub fn run(
+    options: &Options,
+    exposure: f64,
+    output: &Path,
+    encoding: Encoding,
+    context: &Context<'_>,
+) -> Result<Size> {
+    let fits = |size: Size| {
+        encoding.check_size(size)?;
+        encoding.check_memory(size, WRITING_BYTES, context.memory_bytes)
+    };
+    options.window.map_or(Ok(()), |window| fits(window.size))?;
     let mut scene = Scene::open(options, context)?;
     scene.expose(exposure);
     let size = scene.size();
-    // Rows as values, bytes and packed bytes, and the file's buffers.
-    let writing = 32 * size.width as u64 + WRITING_BYTES;
+    fits(size)?;
+    let writing = encoding.memory_bytes(size) + WRITING_BYTES;
     let mut bands = scene.bands(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let mut band: Option<(usize, usize, Band<'_>)> = None;
-    stream::write(output, size, scene.meaning(), |pixels| {
+    stream::write(output, encoding, size, scene.meaning(), |pixels| {
         let (next, rows, read) = match band.take() {
             Some(band) if band.0 < band.1 => band,
             _ => {

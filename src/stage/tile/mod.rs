@@ -17,6 +17,7 @@ use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wa
 use crate::run::Context;
 use crate::run::recipe::METHOD;
 use crate::shape::Size;
+use crate::store::Store;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
@@ -122,6 +123,17 @@ impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
         json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
+    }
+
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        match Store::at(&self.model).attributes()? {
+            Some(_) => Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe),
+            None => Ok(false),
+        }
     }
 
     /// Cuts the tile, unless that is done.

@@ -1,7 +1,11 @@
 //! The library's one error: what went wrong, whose fault it is, what to do.
 
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::Path;
+use std::sync::Arc;
+
+use crate::text::escaped;
 
 /// Whose fault an [`Error`] is. The program turns it into its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,9 +40,15 @@ pub struct Error {
 }
 
 impl Error {
-    /// An error of the given kind.
+    /// An error of the given kind. The message is one line: what would end it, or lead a terminal astray, is escaped.
     pub fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Self { kind, message: message.into(), hint: None, source: None }
+        Self { kind, message: escaped(&message.into()).into_owned(), hint: None, source: None }
+    }
+
+    /// An error whose message has several lines.
+    pub fn list<S: AsRef<str>>(kind: Kind, lines: impl IntoIterator<Item = S>) -> Self {
+        let lines: Vec<String> = lines.into_iter().map(|line| escaped(line.as_ref()).into_owned()).collect();
+        Self { message: lines.join("\n"), ..Self::new(kind, "") }
     }
 
     /// [`Kind::Usage`].
@@ -71,17 +81,39 @@ impl Error {
         Self::new(Kind::Stopped, "stopped on request").hint("run the same command again to go on")
     }
 
-    /// [`Kind::Io`]: the operating system refused `action` on `path`.
+    /// The operating system refused `action` on `path`: [`Kind::Io`], or [`Kind::Missing`] where there is nothing to read.
     pub fn io(action: &str, path: &Path, source: std::io::Error) -> Self {
-        let hint = match source.kind() {
-            std::io::ErrorKind::StorageFull => Some("free some space and run the same command again"),
-            std::io::ErrorKind::PermissionDenied => Some("choose a place that you may write to"),
-            _ => None,
+        let reading = matches!(action, "read" | "list" | "open");
+        let kind = match source.kind() {
+            ErrorKind::NotFound if reading => Kind::Missing,
+            _ => Kind::Io,
         };
-        let mut error = Self::new(Kind::Io, format!("cannot {action} {}: {source}", path.display()));
-        error.hint = hint.map(str::to_owned);
-        error.source = Some(Box::new(source));
-        error
+        Self {
+            hint: advice(&source, reading).map(str::to_owned),
+            ..Self::new(kind, format!("cannot {action} {}: {source}", path.display()))
+        }
+        .caused_by(source)
+    }
+
+    /// [`Kind::Io`]: the operating system refused `action` on a file that the caller [names](Self::at).
+    pub fn refused(action: &str, source: std::io::Error) -> Self {
+        Self {
+            hint: advice(&source, false).map(str::to_owned),
+            ..Self::new(Kind::Io, format!("cannot {action}: {source}"))
+        }
+        .caused_by(source)
+    }
+
+    fn caused_by(mut self, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        self.source = Some(Box::new(source));
+        self
+    }
+
+    /// Names the file of an input or output error that does not name it yet.
+    #[must_use]
+    pub fn at(self, path: &Path) -> Self {
+        let name = escaped(&path.display().to_string()).into_owned();
+        if self.kind == Kind::Io && !self.message.contains(&name) { self.context(name) } else { self }
     }
 
     /// Adds what the user can do about it.
@@ -94,7 +126,7 @@ impl Error {
     /// Puts `context` (usually a path) in front of the message.
     #[must_use]
     pub fn context(mut self, context: impl fmt::Display) -> Self {
-        self.message = format!("{context}: {}", self.message);
+        self.message = format!("{}: {}", escaped(&context.to_string()), self.message);
         self
     }
 
@@ -123,6 +155,70 @@ impl std::error::Error for Error {
 
 impl From<btfkit_formats::Error> for Error {
     fn from(error: btfkit_formats::Error) -> Self {
-        Self::input(error.to_string())
+        let source = std::error::Error::source(&error);
+        let shared =
+            source.and_then(|source| source.downcast_ref::<Arc<std::io::Error>>()).map(AsRef::as_ref);
+        match shared.or_else(|| source?.downcast_ref::<std::io::Error>()) {
+            Some(source) => {
+                let hint = advice(source, false).map(str::to_owned);
+                Self { hint, ..Self::new(Kind::Io, format!("cannot write: {source}")) }
+            }
+            None => Self::list(Kind::Input, error.to_string().lines()),
+        }
+        .caused_by(error)
+    }
+}
+
+/// What to do about what the operating system refused.
+pub(crate) fn advice(error: &std::io::Error, reading: bool) -> Option<&'static str> {
+    match error.kind() {
+        ErrorKind::StorageFull => Some("free some space and run the same command again"),
+        ErrorKind::QuotaExceeded => {
+            Some("your quota of this disk is used up: free some of it and run the same command again")
+        }
+        ErrorKind::FileTooLarge => {
+            Some("files may not be that large here: raise the limit (ulimit -f), or choose another place")
+        }
+        ErrorKind::ReadOnlyFilesystem => Some("choose a place that can be written to"),
+        ErrorKind::PermissionDenied if reading => Some("ask for the right to read it"),
+        ErrorKind::PermissionDenied => Some("choose a place that you may write to"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn what_the_system_refuses_keeps_its_kind_and_its_cause_through_the_formats_crate() {
+        struct Full;
+        impl std::io::Write for Full {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::Error::from(ErrorKind::StorageFull))
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        let mut zip = btfkit_formats::zip::ZipWriter::new(Full);
+        let error = Error::from(zip.write_entry("a", b"b").unwrap_err()).at(Path::new("o.zip"));
+        assert_eq!(error.kind(), Kind::Io);
+        assert!(error.to_string().starts_with("o.zip: "), "{error}");
+        assert!(error.guidance().unwrap().contains("space") && std::error::Error::source(&error).is_some());
+    }
+
+    #[test]
+    fn a_message_is_one_line_whatever_it_names() {
+        let name = Path::new("a\nbtf: all is well\u{1b}[2J");
+        for error in [
+            Error::input(name.display().to_string()),
+            Error::input("x").context(name.display()),
+            Error::io("read", name, std::io::Error::from(ErrorKind::NotFound)),
+        ] {
+            assert!(!error.to_string().contains(['\n', '\u{1b}']), "{error}");
+        }
+        assert_eq!(Error::list(Kind::Input, ["a\u{7}", "b"]).to_string(), "a\\u{7}\nb");
     }
 }

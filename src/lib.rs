@@ -32,6 +32,7 @@ mod signal;
 pub mod stage;
 pub mod store;
 pub mod texel;
+pub mod text;
 pub mod views;
 pub mod words;
 

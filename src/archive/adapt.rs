@@ -7,7 +7,7 @@ use std::path::Path;
 use btfkit_formats::{Contents, Direction, SampleType, Samples, f16};
 use serde::{Deserialize, Serialize};
 
-use super::Source;
+use super::{Reading, Source};
 use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::Context;
@@ -71,16 +71,30 @@ impl From<Type> for SampleType {
     }
 }
 
+impl Adaptation {
+    /// What it does to an archive: whatever asks for what the archive is already is left out, and what the archive
+    /// asks for itself is put in. So different words for the same bytes are the same.
+    fn effective(mut self, of: &Contents) -> Self {
+        self.drop_views.sort_unstable();
+        self.drop_views.dedup();
+        self.cosine_excluded |= !of.cosine_included;
+        self.transfer = self.transfer.filter(|&transfer| (transfer == Transfer::Linear) != of.linear);
+        self.samples = self.samples.filter(|&name| SampleType::from(name) != of.sample_type);
+        self
+    }
+}
+
 /// The source as it should have been.
 ///
 /// # Errors
 /// A view to drop that there is none of, or no view left.
-pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<Box<dyn Source>> {
+pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn Source>> {
     let of = inner.contents();
-    let cosine = adaptation.cosine_excluded || !of.cosine_included;
-    let unchanged = Adaptation { samples: None, ..adaptation.clone() } == Adaptation::default();
+    let adaptation = reading.adaptation.effective(of);
+    let reading = Reading { adaptation: adaptation.clone(), ..reading };
+    let cosine = adaptation.cosine_excluded;
     let wanted = adaptation.samples.map_or(of.sample_type, SampleType::from);
-    if unchanged && !cosine && wanted == of.sample_type {
+    if reading == Reading::default() {
         return Ok(inner);
     }
     let mut contents = of.clone();
@@ -122,6 +136,7 @@ pub(super) fn adapt(inner: Box<dyn Source>, adaptation: &Adaptation) -> Result<B
         swap: adaptation.swap,
         transpose: adaptation.transpose,
         cosines,
+        reading,
     }))
 }
 
@@ -134,6 +149,7 @@ struct Adapted {
     transpose: bool,
     /// What each light's samples are multiplied by, in linear light.
     cosines: Option<Vec<f64>>,
+    reading: Reading,
 }
 
 impl Source for Adapted {
@@ -178,6 +194,10 @@ impl Source for Adapted {
         Ok(samples)
     }
 
+    fn reading(&self) -> Reading {
+        self.reading.clone()
+    }
+
     fn notes(&self) -> Vec<String> {
         self.inner.notes()
     }
@@ -218,6 +238,13 @@ fn mapped(samples: &Samples, sample_type: SampleType, of: impl Fn(usize, f64) ->
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    fn adapted(
+        inner: Box<dyn Source>,
+        adaptation: impl std::borrow::Borrow<Adaptation>,
+    ) -> Result<Box<dyn Source>> {
+        adapt(inner, Reading { adaptation: adaptation.borrow().clone(), ..Reading::default() })
+    }
 
     /// 2 views, 3 lights, 2 rows, 3 columns, one channel: every sample tells its place.
     struct Made(Contents);
@@ -261,7 +288,7 @@ mod tests {
 
     #[test]
     fn nothing_to_do_is_nothing_done() {
-        let source = adapt(made(true), &Adaptation::default()).unwrap();
+        let source = adapted(made(true), Adaptation::default()).unwrap();
         assert_eq!(source.lights_at_once(), 2);
         assert_eq!(source.read_images(1, 2..3).unwrap(), Samples::U8(vec![140, 141, 142, 143, 144, 145]));
     }
@@ -275,19 +302,19 @@ mod tests {
             turn_deg: 90,
             ..Adaptation::default()
         };
-        let source = adapt(made(true), &adaptation).unwrap();
+        let source = adapted(made(true), adaptation).unwrap();
         let degrees = |list: &[Direction]| list.iter().map(|d| d.degrees().1.round()).collect::<Vec<_>>();
         assert_eq!(degrees(&source.contents().views), [90.0, 150.0]);
         assert_eq!(degrees(&source.contents().lights), [90.0, 60.0]);
         let Samples::U8(found) = source.read_images(1, 0..2).unwrap() else { unreachable!() };
         assert_eq!((found[0], found[6]), (40, 140), "view 1 of the result was light 2");
-        assert!(adapt(made(true), &Adaptation { drop_views: vec![2], ..Adaptation::default() }).is_err());
+        assert!(adapted(made(true), Adaptation { drop_views: vec![2], ..Adaptation::default() }).is_err());
     }
 
     #[test]
     fn images_are_transposed_and_converted() {
         let adaptation = Adaptation { transpose: true, samples: Some(Type::F32), ..Adaptation::default() };
-        let source = adapt(made(true), &adaptation).unwrap();
+        let source = adapted(made(true), adaptation).unwrap();
         assert_eq!((source.contents().width, source.contents().height), (2, 3));
         let found = source.read_images(0, 1..2).unwrap();
         let expected: Vec<f32> = [20, 23, 21, 24, 22, 25].iter().map(|&s| s as f32 / 255.0).collect();
@@ -297,8 +324,8 @@ mod tests {
     #[test]
     fn a_missing_cosine_is_multiplied_in() {
         for source in [
-            adapt(made(false), &Adaptation::default()),
-            adapt(made(true), &Adaptation { cosine_excluded: true, ..Adaptation::default() }),
+            adapted(made(false), Adaptation::default()),
+            adapted(made(true), Adaptation { cosine_excluded: true, ..Adaptation::default() }),
         ] {
             let source = source.unwrap();
             assert!(source.contents().cosine_included);

@@ -8,7 +8,7 @@ use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Limits, Pair, rti, tabl
 
 use super::files::Files;
 use super::{Options, read_beside};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 
 /// A complete set of images, how it was found, and what had to be assumed.
 pub(super) struct Found {
@@ -143,7 +143,7 @@ fn has_extension(name: &str, extension: &str) -> bool {
 }
 
 fn incomplete(archive: &Path, errors: &CatalogueErrors) -> Error {
-    Error::input(errors.to_string())
+    Error::list(Kind::Input, errors.to_string().lines())
         .context(archive.display())
         .hint("expected one picture for each pair of directions")
 }

@@ -42,6 +42,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
         samples = Some(Type::U8);
         let known = zero_bytes_beside(path)?;
         Container::open(path, |bytes| Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?)))
+            .map(|container| Container { beside: Some(zero_bytes_place(path)), ..container })
     } else if big::recognise(&head) {
         let order = order(options)?;
         Container::open(path, |bytes| {
@@ -89,9 +90,14 @@ fn order(options: &Options) -> Result<Order> {
     }
 }
 
+/// Where a database's list of ambiguous bytes lies, if there is one.
+fn zero_bytes_place(path: &Path) -> PathBuf {
+    path.with_file_name("zero_bytes.txt")
+}
+
 /// What is known of the ambiguous bytes of a database, from `zero_bytes.txt` in its folder.
 fn zero_bytes_beside(path: &Path) -> Result<mlvq::ZeroBytes> {
-    let file = path.with_file_name("zero_bytes.txt");
+    let file = zero_bytes_place(path);
     if !file.is_file() {
         return Ok(mlvq::ZeroBytes::default());
     }
@@ -127,6 +133,8 @@ struct Container {
     path: PathBuf,
     file: MappedFile,
     images: Box<dyn Images>,
+    /// A file beside it that its samples depend on, if it is there.
+    beside: Option<PathBuf>,
 }
 
 impl Container {
@@ -145,7 +153,7 @@ impl Container {
                 error
             }
         })?;
-        Ok(Self { path: path.to_owned(), file, images })
+        Ok(Self { path: path.to_owned(), file, images, beside: None })
     }
 }
 
@@ -170,6 +178,10 @@ impl Source for Container {
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
-        digest_of(&self.path, context)
+        let digest = digest_of(&self.path, context)?;
+        match self.beside.as_deref().filter(|beside| beside.is_file()) {
+            Some(beside) => Ok(format!("{digest} {}", digest_of(beside, context)?)),
+            None => Ok(digest),
+        }
     }
 }

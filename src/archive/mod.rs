@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
@@ -44,6 +45,11 @@ pub trait Source: Send + Sync {
 
     /// The images of one view under a range of lights, [light, y, x, channel].
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples>;
+
+    /// How the archive is read where more than one way is possible; a part of the recipe of all that is made of it.
+    fn reading(&self) -> Reading {
+        Reading::default()
+    }
 
     /// What a user should know of the archive that its samples do not depend on, a sentence each.
     fn notes(&self) -> Vec<String> {
@@ -75,13 +81,48 @@ pub struct Options {
     pub hdr_orientation: HdrOrientation,
 }
 
+/// How an archive is read, as recipes hold it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Reading {
+    /// What is mended.
+    #[serde(flatten)]
+    pub adaptation: Adaptation,
+    /// The published list or order that was named.
+    pub order: Option<String>,
+    /// Whether rows of Bonn containers begin with the bottom one.
+    pub bottom_row_first: bool,
+    /// Whether scan lines of Radiance pictures that are columns are read as rows.
+    pub columns_as_rows: bool,
+}
+
+impl Reading {
+    /// Every option by its name, so that a new one is not forgotten.
+    fn of(options: &Options) -> Self {
+        let Options {
+            adaptation,
+            // What these two find is in every recipe: the directions, and the digest of the images in their order.
+            pattern: _,
+            table: _,
+            order,
+            rows,
+            hdr_orientation,
+        } = options;
+        Self {
+            adaptation: adaptation.clone(),
+            order: order.clone(),
+            bottom_row_first: *rows == RowOrder::BottomFirst,
+            columns_as_rows: *hdr_orientation == HdrOrientation::Atrium,
+        }
+    }
+}
+
 /// Recognises and opens an archive: the file or folder at one path, or the pieces at several.
 ///
 /// # Errors
 /// Says what was found where nothing is recognised.
 pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
     let limits = Limits::default();
-    let mut adaptation = options.adaptation.clone();
+    let mut reading = Reading::of(options);
     let single = match paths {
         [path] if path.is_file() => container::recognise(path, options, &limits)?,
         _ => None,
@@ -89,12 +130,12 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
     let source: Box<dyn Source> = match single {
         Some(recognised) => {
             // Databases of display values come from 8-bit images.
-            adaptation.samples = adaptation.samples.or(recognised.samples);
+            reading.adaptation.samples = reading.adaptation.samples.or(recognised.samples);
             recognised.source
         }
         None => Box::new(pictures::Pictures::open(paths, options, limits)?),
     };
-    adapt::adapt(source, &adaptation)
+    adapt::adapt(source, reading)
 }
 
 /// The bytes of a small file beside an archive.

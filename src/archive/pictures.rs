@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::catalogue::{self, Found};
 use super::files::Files;
 use super::{Options, Source};
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::run::{Context, recipe};
 
 /// Problems that an error names one by one.
@@ -172,15 +172,10 @@ pub(super) fn fail_on(archive: &Path, problems: &[String]) -> Result<()> {
     if problems.is_empty() {
         return Ok(());
     }
-    let mut lines: Vec<&str> = problems.iter().take(NAMED_PROBLEMS).map(String::as_str).collect();
-    let more = format!("and {} more", problems.len().saturating_sub(NAMED_PROBLEMS));
+    let mut lines = vec![format!("{}: {} unusable images", archive.display(), problems.len())];
+    lines.extend(problems.iter().take(NAMED_PROBLEMS).map(|problem| format!("  {problem}")));
     if problems.len() > NAMED_PROBLEMS {
-        lines.push(&more);
+        lines.push(format!("  and {} more", problems.len() - NAMED_PROBLEMS));
     }
-    Err(Error::input(format!(
-        "{}: {} unusable images\n  {}",
-        archive.display(),
-        problems.len(),
-        lines.join("\n  ")
-    )))
+    Err(Error::list(Kind::Input, lines))
 }

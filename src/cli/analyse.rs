@@ -311,7 +311,7 @@ fn run_clusters(
     match &options.clusters_of {
         Some(from) => {
             let plan = taken_plan(model, from)?;
-            Ok((plan.is_done()?, plan.run()?))
+            Ok((plan.is_done()?, plan.run(context)?))
         }
         None => {
             let plan = cluster_plan(measurement, model, options, seed)?;
@@ -422,11 +422,11 @@ impl Compare {
                     format!("{:.3}", errors.ciede2000)
                 ]);
             }
-            tell.line(table(&rows));
+            tell.text(&table(&rows));
             tell.line(format!("CIEDE2000 over {} texels, the other figures over all", report.colour_texels));
         }
         match &self.picture {
-            Some(path) => self.side_by_side(context)?.write(path),
+            Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),
             None => Ok(()),
         }
     }

@@ -59,7 +59,7 @@ impl Check {
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
-            check::picture::sheet(&statistics, &findings).write(path)?;
+            check::picture::sheet(&statistics, &findings).write(path, context.existing)?;
         }
         faults(first(&self.paths), &report).map_or(Ok(Ended::Done), Err)
     }
@@ -123,13 +123,12 @@ fn tell_report(report: &Report, tell: Tell) {
         let alarm = check.alarm.map_or(String::new(), |alarm| format!("{:.0} %", 100.0 * alarm));
         rows.push(row![check.name, state, alarm, check.detail]);
     }
-    tell.line(table(&rows));
+    tell.text(&table(&rows));
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
-        tell.line(format!(
-            "\n{severity}: {} (confidence {:.2})\n  {}",
-            finding.code, finding.confidence, finding.message
-        ));
+        tell.line("");
+        tell.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
+        tell.line(format!("  {}", finding.message));
         tell.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
             tell.line(format!("  repair:   btf import ... {repair}"));

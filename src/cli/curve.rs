@@ -60,7 +60,7 @@ impl Curve {
             tell_curve(&curve, tell);
         }
         if let Some(path) = &self.out {
-            curve.chart().draw().write(path)?;
+            curve.chart().draw().write(path, context.existing)?;
         }
         Ok(())
     }
@@ -76,7 +76,7 @@ fn tell_curve(curve: &curve::Curve, tell: Tell) {
             curve::ratio_text(point.ratio)
         ]);
     }
-    tell.line(table(&rows));
+    tell.text(&table(&rows));
     if curve.sample_texels < curve.tile_texels {
         tell.line(format!("of a sample of {} of {} texels", curve.sample_texels, curve.tile_texels));
     }

@@ -31,7 +31,7 @@ impl Demo {
         let report = demo::run(&options, context)?;
         let rows: Vec<_> =
             report.steps.iter().map(|step| row![step.name, format!("{:.2} s", step.seconds)]).collect();
-        tell.line(table(&rows));
+        tell.text(&table(&rows));
         tell.line(format!("open {} in a browser", report.page.display()));
         Ok(())
     }

@@ -59,8 +59,8 @@ pub(super) fn each<I>(
         context.progress.pause(&mut || {
             match (&line, &error) {
                 (Some(Line::Text(text)), None) => tell.line(format!("{name}: {text}")),
-                (Some(Line::Json(value)), _) => tell.as_it_is(&of_json(&name, Some(value), error.as_ref())),
-                (None, Some(_)) if as_json => tell.as_it_is(&of_json(&name, None, error.as_ref())),
+                (Some(Line::Json(value)), _) => tell.json_line(&of_json(&name, Some(value), error.as_ref())),
+                (None, Some(_)) if as_json => tell.json_line(&of_json(&name, None, error.as_ref())),
                 _ => {}
             }
             if let Some(error) = &error {
@@ -84,7 +84,7 @@ fn count(worked_on: usize, failed: &[String]) -> String {
 }
 
 /// The line of an input as JSON: what is known of it, and what is wrong.
-fn of_json(name: &str, value: Option<&Value>, error: Option<&Error>) -> String {
+fn of_json(name: &str, value: Option<&Value>, error: Option<&Error>) -> Value {
     let mut line = Map::new();
     line.insert("path".to_owned(), json!(name));
     match value {
@@ -96,7 +96,7 @@ fn of_json(name: &str, value: Option<&Value>, error: Option<&Error>) -> String {
         line.insert("error".to_owned(), json!(error.to_string()));
         line.insert("advice".to_owned(), json!(error.guidance()));
     }
-    Value::Object(line).to_string()
+    Value::Object(line)
 }
 
 /// Of two kinds of failure the one that a caller has to know of: trouble with the machine or the program comes before

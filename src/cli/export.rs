@@ -7,7 +7,7 @@ use btfkit::store::measurement::Measurement;
 use clap::{Args, ValueEnum};
 
 use super::deepzoom::Deepzoom;
-use super::{Tell, bytes_text};
+use super::{Tell, bytes_text, found};
 
 /// Measurement to archive (UBO2003 zip, EXR or PNG folder, HDF5, npy, Bonn DFMF or FMF), picture to Deep Zoom tiles
 #[derive(Args)]
@@ -78,7 +78,7 @@ impl Export {
             quality: self.quality.unwrap_or(100),
         };
         let report = export::run(&measurement, &options, context)?;
-        tell.line(format!("{}: {}", self.output.display(), bytes_text(report.bytes)));
+        tell.line(format!("{}: {}{}", self.output.display(), bytes_text(report.bytes), found(report.made)));
         for warning in &report.warnings {
             tell.line(format!("note: {warning}"));
         }

@@ -1,12 +1,13 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::mrf;
 use btfkit::mrf::marginals::Matching;
 use btfkit::run::Context;
 use btfkit::stage::fit::statistics::{COMPONENTS, Figures};
 use btfkit::stage::fit::{self, sheet};
 use btfkit::store::field::FieldReport;
+use btfkit::store::output::write_new;
 use clap::{Args, ValueEnum};
 
 use super::Tell;
@@ -93,11 +94,10 @@ impl Fit {
         let comparison = fit::compare(&self.model, context)?;
         let text = figures_text(&comparison.figures());
         let file = |ending: &str| PathBuf::from(format!("{}.{ending}", name.display()));
-        std::fs::write(file("txt"), format!("{text}\n"))
-            .map_err(|error| Error::io("write", &file("txt"), error))?;
+        write_new(&file("txt"), context.existing, format!("{text}\n").as_bytes())?;
         let title = self.model.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        sheet::draw(&comparison, &title).write(&file("png"))?;
-        tell.line(text);
+        tell.text(&text);
+        sheet::draw(&comparison, &title).write(&file("png"), context.existing)?;
         Ok(())
     }
 }

@@ -141,7 +141,7 @@ fn page_name(command: &Command) -> String {
 fn rendered(command: &Command) -> Result<Vec<u8>> {
     let name = page_name(command);
     // A page of a command is called by the name that `man` is asked for.
-    let man = Man::new(command.clone().name(name.clone())).title(name).date("");
+    let man = Man::new(command.clone()).title(name).date("");
     let mut page = Vec::new();
     let failed = |error: std::io::Error| Error::internal(format!("cannot render a manual page: {error}"));
     man.render_title(&mut page).map_err(failed)?;

@@ -6,8 +6,8 @@ use btfkit::run::Context;
 use btfkit::stage::image;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
 use super::scene::SceneArgs;
+use super::{Tell, found};
 
 /// Picture of a measurement, a model's tile or an enlarged index
 #[derive(Args)]
@@ -73,8 +73,8 @@ impl Image {
             BitsName::Sixteen => Bits::Sixteen,
         };
         let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(Some(bits), self.quality)?;
-        let size = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
-        tell.line(format!("{}: {size}", self.out.display()));
+        let (size, made) = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
+        tell.line(format!("{}: {size}{}", self.out.display(), found(made)));
         Ok(())
     }
 }

@@ -25,10 +25,10 @@ Examples:
   btf import wall.btf --codec predictive          half the size of the default; zarr-python needs our module to read it
 Interrupted, the same command goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives; the last name is the store to make if it ends in .zarr or does not exist yet
+    /// Archives; the last name is the store to make if it ends in .zarr, unless --into is given
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
-    /// Folder for the stores of several archives [default: here]
+    /// Folder for the stores, one for each name: all names are archives [default: here]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     #[command(flatten)]
@@ -69,13 +69,25 @@ impl Import {
     }
 
     fn jobs(&self) -> Result<Vec<Job>> {
-        let is_store = |path: &Path| {
-            path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists() || !path.exists()
-        };
+        let is_store =
+            |path: &Path| path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists();
         let folder = self.into.clone().unwrap_or_default();
+        // Misspelt, the last of many archives is not to become a store.
+        if let Some(absent) =
+            self.paths.iter().find(|path| !path.exists() && !(self.into.is_none() && is_store(path)))
+        {
+            let error = Error::missing(format!("{}: no such archive", absent.display()));
+            return Err(
+                if self.into.is_none() && self.paths.len() > 1 && Some(absent) == self.paths.last() {
+                    error.hint("the store to make is named last, and ends in .zarr")
+                } else {
+                    error
+                },
+            );
+        }
         match self.paths.split_last() {
-            Some((store, pieces)) if is_store(store) && !pieces.is_empty() => {
-                Ok(vec![Job { pieces: pieces.to_vec(), store: folder.join(store) }])
+            Some((store, pieces)) if self.into.is_none() && is_store(store) && !pieces.is_empty() => {
+                Ok(vec![Job { pieces: pieces.to_vec(), store: store.clone() }])
             }
             _ => {
                 let job = |path: &PathBuf| Job {
@@ -128,7 +140,8 @@ impl Import {
         let total = jobs.iter().map(images).sum();
         context.progress.begin("import", total, Counted::Items("images"));
         let overall = Overall { bar: context.progress };
-        let inner = Context::new(&overall, context.stop, context.threads, context.memory_bytes)?;
+        let inner = Context::new(&overall, context.stop, context.threads, context.memory_bytes)?
+            .with_existing(context.existing);
         let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
         each(jobs, name, false, context, tell, |job| {
             context.progress.remark(&name(job));
@@ -179,5 +192,9 @@ impl Progress for Overall<'_> {
 
     fn pause(&self, act: &mut dyn FnMut()) {
         self.bar.pause(act);
+    }
+
+    fn notice(&self, text: &str) {
+        self.bar.notice(text);
     }
 }

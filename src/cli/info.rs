@@ -70,7 +70,7 @@ impl Info {
                 Ok((Line::Text(in_short(&self.rows(std::slice::from_ref(path), context)?)), None))
             });
         }
-        tell.line(table(&self.rows(&self.paths, context)?));
+        tell.text(&table(&self.rows(&self.paths, context)?));
         Ok(Ended::Done)
     }
 

@@ -6,7 +6,8 @@ use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
-use btfkit::store::mapped::write_file;
+use btfkit::store::output::write_new;
+use btfkit::text::escaped;
 use clap::Args;
 
 use super::Tell;
@@ -63,15 +64,15 @@ impl Judge {
             },
             context,
         )?;
+        tell.text(&told(&report));
         if let Some(path) = &self.json {
             let text =
                 serde_json::to_string_pretty(&report).map_err(|error| Error::internal(error.to_string()))?;
-            write_file(path, text.as_bytes())?;
+            write_new(path, context.existing, text.as_bytes())?;
         }
         if let Some(path) = &self.sheet {
-            sheet.write(path)?;
+            sheet.write(path, context.existing)?;
         }
-        tell.line(told(&report));
         Ok(())
     }
 }
@@ -85,7 +86,7 @@ fn told(report: &Report) -> String {
     let mut lines = vec![
         format!(
             "{}: {}, {} crops of {} texels",
-            report.subject.display(),
+            escaped(&report.subject.display().to_string()),
             Size::new(height, width),
             report.crops.len(),
             report.crop

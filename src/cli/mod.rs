@@ -34,6 +34,8 @@ use std::sync::atomic::AtomicBool;
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Progress, Silent};
+use btfkit::store::output::{Existing, Made};
+use btfkit::text::{escaped, escaped_json, escaped_lines};
 use bytes::bytes_text;
 use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 use each::Ended;
@@ -76,6 +78,10 @@ struct Common {
     /// How to tell progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
+    /// Replace files that are where results are to be, and make anew what another recipe made there. Without it nothing
+    /// that exists is ever replaced
+    #[arg(long, global = true)]
+    force: bool,
     /// Say nothing but errors
     #[arg(long, short, global = true)]
     quiet: bool,
@@ -131,6 +137,8 @@ pub(crate) fn run() -> ExitCode {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
+    // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
         _ if cli.common.quiet => Box::new(Silent),
         ProgressStyle::None => Box::new(Silent),
@@ -139,6 +147,9 @@ pub(crate) fn run() -> ExitCode {
     };
     let tell = Tell { quiet: cli.common.quiet, found: false };
     let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
+        .map(|context| {
+            context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
+        })
         .and_then(|context| cli.command.run(&context, tell));
     progress.end();
     match result {
@@ -215,9 +226,19 @@ impl Tell {
         self.line(format!("{label:<10}{found}{text}"));
     }
 
+    /// One line. Whatever it names cannot end it, or change what the terminal shows.
     fn line(self, text: impl std::fmt::Display) {
+        self.print(&escaped(&text.to_string()));
+    }
+
+    /// Lines, of a table say, whose cells are escaped already.
+    fn text(self, text: &str) {
+        self.print(&escaped_lines(text));
+    }
+
+    fn print(self, text: &str) {
         if !self.quiet {
-            self.as_it_is(&terminal::wrapped(&text.to_string(), terminal::of_output()));
+            self.as_it_is(&terminal::wrapped(text, terminal::of_output()));
         }
     }
 
@@ -236,22 +257,28 @@ impl Tell {
             text = format!("{name}: {text}");
         }
         let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
-        let text = terminal::wrapped(&format!("btf: {text}{hint}"), terminal::of_errors());
+        let told = format!("btf: {text}{hint}");
+        let text = terminal::wrapped(&escaped_lines(&told), terminal::of_errors());
         let _ = writeln!(std::io::stderr(), "{text}");
     }
 
     /// The last line of many; beside JSON on standard error.
     fn count(self, beside_json: bool, text: &str) {
         match beside_json {
-            true if !self.quiet => drop(writeln!(std::io::stderr(), "btf: {text}")),
+            true if !self.quiet => drop(writeln!(std::io::stderr(), "btf: {}", escaped(text))),
             _ => self.line(text),
         }
+    }
+
+    /// JSON as one line.
+    fn json_line(self, value: &Value) {
+        self.as_it_is(&escaped_json(&value.to_string()));
     }
 
     fn plan(self, summary: &Value) -> Result<()> {
         let text =
             serde_json::to_string_pretty(summary).map_err(|error| Error::internal(error.to_string()))?;
-        self.as_it_is(&text);
+        self.as_it_is(&escaped_json(&text));
         Ok(())
     }
 }
@@ -259,4 +286,12 @@ impl Tell {
 /// A report as JSON.
 fn as_json(report: &impl serde::Serialize) -> Result<Value> {
     serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))
+}
+
+/// What a line about a result ends with.
+fn found(made: Made) -> &'static str {
+    match made {
+        Made::Written => "",
+        Made::Found => ", found done",
+    }
 }

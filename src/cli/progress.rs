@@ -5,6 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use btfkit::run::progress::{Counted, Progress, Stage};
+use btfkit::text::{escaped, escaped_json};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
 /// Least time between two JSON lines.
@@ -46,7 +47,8 @@ impl Progress for Bars {
             Some(stage) => format!("{stage}, {title}"),
             None => title.to_owned(),
         };
-        let bar = ProgressBar::new(total).with_prefix(prefix);
+        self.end();
+        let bar = ProgressBar::new(total).with_prefix(escaped(&prefix).into_owned());
         let rate = |state: &ProgressState, to: &mut dyn std::fmt::Write| {
             let _ = write!(to, "{:.0}/s", state.per_sec());
         };
@@ -73,13 +75,19 @@ impl Progress for Bars {
     }
 
     fn remark(&self, text: &str) {
-        self.with(|bar| bar.set_message(text.to_owned()));
+        self.with(|bar| bar.set_message(escaped(text).into_owned()));
     }
 
     fn end(&self) {
         if let Some(bar) = self.bar.lock().unwrap_or_else(PoisonError::into_inner).take() {
             bar.finish_and_clear();
         }
+    }
+
+    fn notice(&self, text: &str) {
+        self.pause(&mut || {
+            let _ = writeln!(std::io::stderr(), "btf: {}", escaped(text));
+        });
     }
 
     fn pause(&self, act: &mut dyn FnMut()) {
@@ -118,8 +126,12 @@ impl Step {
             "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
             "stage": self.stage.map(as_json),
         });
-        let _ = writeln!(std::io::stderr(), "{line}");
+        write_line(&line);
     }
+}
+
+fn write_line(line: &serde_json::Value) {
+    let _ = writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string()));
 }
 
 fn as_json(stage: Stage) -> serde_json::Value {
@@ -161,12 +173,16 @@ impl Progress for Lines {
             step.tell("end");
         }
     }
+
     fn stage(&self, stage: Option<Stage>) {
         self.end();
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
         if let Some(stage) = stage {
-            let line = serde_json::json!({"event": "stage", "stage": as_json(stage)});
-            let _ = writeln!(std::io::stderr(), "{line}");
+            write_line(&serde_json::json!({"event": "stage", "stage": as_json(stage)}));
         }
+    }
+
+    fn notice(&self, text: &str) {
+        write_line(&serde_json::json!({"event": "notice", "text": text}));
     }
 }

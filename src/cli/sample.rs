@@ -7,7 +7,7 @@ use btfkit::shape::Size;
 use btfkit::stage::sample;
 use clap::{Args, ValueEnum};
 
-use super::{Tell, bytes_text};
+use super::{Tell, bytes_text, found};
 
 /// Make a synthetic measurement in UBO2003's layout
 #[derive(Args)]
@@ -70,10 +70,11 @@ impl Sample {
             context,
         )?;
         tell.line(format!(
-            "{}: {} images, {}",
+            "{}: {} images, {}{}",
             self.archive.display(),
             report.images,
-            bytes_text(report.bytes)
+            bytes_text(report.bytes),
+            found(report.made)
         ));
         Ok(())
     }

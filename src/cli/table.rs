@@ -65,9 +65,9 @@ fn is_number(cell: &str) -> bool {
     (is_numeric || matches!(number, "" | "-" | "nan" | "inf" | "NaN")) && unit.len() <= 3
 }
 
-/// A row from anything that can be shown.
+/// A row from anything that can be shown; a cell is one line.
 macro_rules! row {
-    ($($cell:expr),* $(,)?) => { vec![$(format!("{}", $cell)),*] };
+    ($($cell:expr),* $(,)?) => { vec![$(btfkit::text::escaped(&format!("{}", $cell)).into_owned()),*] };
 }
 pub(super) use row;
 

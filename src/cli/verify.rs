@@ -4,6 +4,7 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::stage::verify;
 use btfkit::store::measurement::Measurement;
+use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
@@ -50,7 +51,7 @@ impl Verify {
         if self.json {
             tell.plan(&as_json(&report)?)?;
         } else {
-            tell.line(self.told(&report, views));
+            tell.text(&self.told(&report, views));
         }
         judge(store, &report).map(|()| Ended::Done)
     }
@@ -88,7 +89,10 @@ impl Verify {
             let [y, x] = damage.texel;
             text.push_str(&format!(
                 "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
-                damage.array, damage.view, damage.file, damage.what
+                damage.array,
+                damage.view,
+                escaped(&damage.file),
+                escaped(&damage.what)
             ));
         }
         for (view, light) in &report.different_images {

@@ -12,7 +12,8 @@ use serde_json::{Map, Value};
 use super::attribute;
 use super::measurement::{DIRECTIONS, LUMINANCE, RADIOMETRY, REFLECTANCE, TOLD, TRANSFER};
 use crate::error::{Error, Kind, Result};
-use crate::store::mapped;
+use crate::store::mapped::{self, Temporary};
+use crate::store::output::{self, Existing, Made};
 use crate::store::{FORMAT, measurement::KIND};
 
 /// Side of a chunk in texels.
@@ -25,6 +26,7 @@ const DEFLATE_LEVEL: u8 = 1;
 /// nothing.
 pub struct Writer {
     path: PathBuf,
+    existing: Existing,
     temporary: PathBuf,
     file: Option<File>,
     /// [view, y, x, light, channel].
@@ -56,12 +58,15 @@ impl Writer {
                 path.display()
             )));
         }
+        // The C library holds a lock of the same kind on the file that it writes.
+        Temporary::sweep_beside(path);
         let temporary = mapped::temporary_name(path);
         // The newer layout of metadata has checksums throughout; the older one has none, and the C library believes it.
         let builder = File::with_options().with_fapl(|access| access.libver_v110()).clone();
         let file = builder.create_excl(&temporary).map_err(|error| cannot_write(path, &error))?;
         let mut writer = Self {
             path: path.to_owned(),
+            existing: Existing::Keep,
             temporary,
             file: Some(file),
             shape,
@@ -71,6 +76,13 @@ impl Writer {
         };
         writer.begin(contents, attributes).map_err(|error| cannot_write(path, &error))?;
         Ok(writer)
+    }
+
+    /// The same, and what to do about a file that has the name when it is finished.
+    #[must_use]
+    pub fn with_existing(mut self, existing: Existing) -> Self {
+        self.existing = existing;
+        self
     }
 
     fn begin(&mut self, contents: &Contents, attributes: &Map<String, Value>) -> hdf5::Result<()> {
@@ -181,7 +193,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`crate::Kind::Internal`] where views are missing; [`crate::Kind::Io`].
-    pub fn finish(mut self) -> Result<()> {
+    pub fn finish(mut self) -> Result<Made> {
         let counts = [&self.written[0], &self.written[1]].map(BTreeSet::len);
         let views = self.shape[0];
         if counts[0] != views || (counts[1] != 0 && counts[1] != views) {
@@ -196,7 +208,7 @@ impl Writer {
         if let Some(file) = self.file.take() {
             file.flush().and_then(|()| file.close()).map_err(|error| cannot_write(&self.path, &error))?;
         }
-        mapped::publish(&self.temporary, &self.path).map_err(|error| Error::io("write", &self.path, error))
+        output::settle(&self.temporary, &self.path, self.existing)
     }
 }
 

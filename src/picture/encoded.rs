@@ -1,13 +1,13 @@
 //! Picture files that are put together in memory, by the crate `image`: JPEG, lossless WebP and TIFF, without metadata.
 
-use std::io::{Seek, Write};
-use std::path::Path;
+use std::io::{Cursor, Write};
 
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::tiff::TiffEncoder;
 use image::codecs::webp::WebPEncoder;
-use image::{ExtendedColorType, ImageEncoder, ImageError, ImageResult};
+use image::{ExtendedColorType, ImageEncoder, ImageResult};
 
+use super::stream::refused;
 use super::{Bits, Encoding, Ending, Meaning};
 use crate::error::{Error, Result};
 use crate::shape::Size;
@@ -17,8 +17,7 @@ use crate::shape::Size;
 /// # Errors
 /// Those of `row`, [`crate::Kind::Io`] where the system refuses to write, and what the encoder refuses.
 pub(super) fn write(
-    path: &Path,
-    output: impl Write + Seek,
+    mut output: impl Write,
     encoding: Encoding,
     size: Size,
     meaning: Meaning,
@@ -45,16 +44,15 @@ pub(super) fn write(
     };
     let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
     let (width, height) = (side(size.width), side(size.height));
-    let written: ImageResult<()> = match encoding.ending {
-        Ending::Jpeg => {
-            JpegEncoder::new_with_quality(output, encoding.quality).write_image(&bytes, width, height, color)
-        }
-        Ending::WebP => WebPEncoder::new_lossless(output).write_image(&bytes, width, height, color),
-        Ending::Tiff => TiffEncoder::new(output).write_image(&bytes, width, height, color),
+    let mut file = Cursor::new(Vec::new());
+    let encoded: ImageResult<()> = match encoding.ending {
+        Ending::Jpeg => JpegEncoder::new_with_quality(&mut file, encoding.quality)
+            .write_image(&bytes, width, height, color),
+        Ending::WebP => WebPEncoder::new_lossless(&mut file).write_image(&bytes, width, height, color),
+        Ending::Tiff => TiffEncoder::new(&mut file).write_image(&bytes, width, height, color),
         Ending::Png | Ending::Exr => return Err(Error::internal("PNG and EXR are written row by row")),
     };
-    written.map_err(|error| match error {
-        ImageError::IoError(error) => Error::io("write", path, error),
-        error => Error::internal(format!("cannot encode the picture: {error}")),
-    })
+    encoded.map_err(|error| Error::internal(format!("cannot encode the picture: {error}")))?;
+    // From front to back, as an output is compared with what is there.
+    output.write_all(file.get_ref()).map_err(refused)
 }

@@ -185,10 +185,10 @@ impl Encoding {
         match self.ending {
             Ending::Png | Ending::Exr => row,
             Ending::Jpeg => row + whole + whole / 2,
-            // The samples in the order of the machine, and once more while they are written.
-            Ending::Tiff => row + 2 * whole,
-            // The encoder keeps pixels of four bytes, and the packed picture.
-            Ending::WebP => row + 4 * whole,
+            // The samples in the order of the machine, and the file, which grows by doubling.
+            Ending::Tiff => row + 3 * whole,
+            // The encoder keeps pixels of four bytes, and the packed picture twice.
+            Ending::WebP => row + 5 * whole,
         }
     }
 

@@ -14,6 +14,7 @@ pub use ending::{Bits, Encoding, Ending};
 use crate::color::{srgb_encode, srgb_encode_all};
 use crate::error::Result;
 use crate::shape::{Size, Window};
+use crate::store::output::{Existing, Made};
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,11 +154,12 @@ impl Picture {
     /// Writes a file whose format the ending of its name says; it appears whole or not at all.
     ///
     /// # Errors
-    /// An ending that is not known, a size that the format does not take, and those of writing.
-    pub fn write(&self, path: &Path) -> Result<()> {
+    /// An ending that is not known, a size that the format does not take, those of writing, and
+    /// [`crate::Kind::Recipe`] where another file is.
+    pub fn write(&self, path: &Path, existing: Existing) -> Result<Made> {
         let encoding = Encoding::of(path, &Ending::ALL)?;
         let mut rows = self.pixels.chunks_exact(self.size.width);
-        stream::write(path, encoding, self.size, self.meaning, |row| {
+        stream::write(path, encoding, self.size, self.meaning, existing, |row| {
             rows.next().into_iter().for_each(|pixels| row.copy_from_slice(pixels));
             Ok(())
         })
@@ -168,8 +170,8 @@ impl Picture {
 pub fn png(size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut writer = stream::png_header(&mut bytes, size, Bits::Eight)?;
-    writer.write_image_data(pixels).map_err(|error| stream::png_failed(&error))?;
-    writer.finish().map_err(|error| stream::png_failed(&error))?;
+    writer.write_image_data(pixels).map_err(stream::png_failed)?;
+    writer.finish().map_err(stream::png_failed)?;
     Ok(bytes)
 }
 

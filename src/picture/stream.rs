@@ -1,7 +1,6 @@
 //! Picture files written row by row, so that a picture may be larger than memory.
 
-use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use exr::block::writer::ChunksWriter;
@@ -13,7 +12,7 @@ use exr::meta::header::Header;
 use crate::error::{Error, Result};
 use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
 use crate::shape::Size;
-use crate::store::output::write_whole;
+use crate::store::output::{Existing, Made, write_whole};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
@@ -23,21 +22,20 @@ const PIECE_BYTES: usize = 64 << 10;
 /// PNG and EXR are written as the rows come; of other formats all rows are gathered first.
 ///
 /// # Errors
-/// A size that the format does not take, those of `row` and of writing.
+/// A size that the format does not take, those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
 pub fn write(
     path: &Path,
     encoding: Encoding,
     size: Size,
     meaning: Meaning,
+    existing: Existing,
     row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
-) -> Result<()> {
+) -> Result<Made> {
     encoding.check_size(size)?;
-    write_whole(path, |output: &mut BufWriter<File>| match encoding.ending {
+    write_whole(path, existing, |output| match encoding.ending {
         Ending::Png => png(output, encoding.bits, size, meaning, row),
         Ending::Exr => exr(output, size, row),
-        Ending::Jpeg | Ending::WebP | Ending::Tiff => {
-            encoded::write(path, output, encoding, size, meaning, row)
-        }
+        Ending::Jpeg | Ending::WebP | Ending::Tiff => encoded::write(output, encoding, size, meaning, row),
     })
 }
 
@@ -50,7 +48,7 @@ fn png(
     mut row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<()> {
     let mut writer = png_header(output, size, bits)?;
-    let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(|error| png_failed(&error))?;
+    let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(png_failed)?;
     let mut pixels = vec![[0.0; 3]; size.width];
     let mut bytes = vec![0; 3 * size.width * bits.bytes()];
     let mut wide = vec![0u16; 3 * size.width];
@@ -64,10 +62,10 @@ fn png(
                 bytes.iter_mut().zip(samples).for_each(|(to, byte)| *to = byte);
             }
         }
-        stream.write_all(&bytes).map_err(|error| png_failed(&error))?;
+        stream.write_all(&bytes).map_err(refused)?;
     }
-    stream.finish().map_err(|error| png_failed(&error))?;
-    writer.finish().map_err(|error| png_failed(&error))
+    stream.finish().map_err(png_failed)?;
+    writer.finish().map_err(png_failed)
 }
 
 /// Begins a PNG of sRGB values.
@@ -80,12 +78,20 @@ pub(super) fn png_header<W: Write>(output: W, size: Size, bits: Bits) -> Result<
         Bits::Sixteen => png::BitDepth::Sixteen,
     });
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    encoder.write_header().map_err(|error| png_failed(&error))
+    encoder.write_header().map_err(png_failed)
 }
 
 /// An error of writing a PNG.
-pub(super) fn png_failed(error: &dyn std::fmt::Display) -> Error {
-    Error::internal(format!("cannot encode a PNG: {error}"))
+pub(super) fn png_failed(error: png::EncodingError) -> Error {
+    match error {
+        png::EncodingError::IoError(error) => refused(error),
+        error => Error::internal(format!("cannot encode a PNG: {error}")),
+    }
+}
+
+/// What the operating system refused; the caller knows the path.
+pub(super) fn refused(error: std::io::Error) -> Error {
+    Error::refused("write", error)
 }
 
 /// An EXR of the values as 32-bit floats, a row a block.
@@ -118,6 +124,7 @@ pub(super) fn exr(
     });
     match (failed, written) {
         (Some(error), _) => Err(error),
+        (None, Err(exr::error::Error::Io(error))) => Err(refused(error)),
         (None, written) => written.map_err(|error| Error::internal(format!("cannot encode an EXR: {error}"))),
     }
 }

@@ -2,12 +2,14 @@
 //! progress, and stopping on request.
 
 pub mod progress;
+pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
+use crate::store::output::Existing;
 use progress::Progress;
 
 /// What every stage is given besides its options.
@@ -20,6 +22,8 @@ pub struct Context<'a> {
     pub threads: usize,
     /// Resident memory that the work may use.
     pub memory_bytes: u64,
+    /// What to do about what lies where a result is to be.
+    pub existing: Existing,
     pool: rayon::ThreadPool,
 }
 
@@ -36,7 +40,13 @@ impl<'a> Context<'a> {
             .num_threads(threads)
             .build()
             .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
-        Ok(Self { progress, stop, threads, memory_bytes, pool })
+        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+    }
+
+    /// The same, with results that take the place of what is there.
+    #[must_use]
+    pub fn with_existing(self, existing: Existing) -> Self {
+        Self { existing, ..self }
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.
@@ -48,4 +58,20 @@ impl<'a> Context<'a> {
     pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.pool.install(work)
     }
+}
+
+/// Starts a thread of a scope.
+///
+/// # Errors
+/// [`Kind::Io`] where the system starts none.
+fn spawn<'scope>(
+    scope: &'scope std::thread::Scope<'scope, '_>,
+    name: &str,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
+    started.map(|_| ()).map_err(|error| {
+        Error::new(Kind::Io, format!("cannot start the thread \"{name}\": {error}"))
+            .hint("allow more processes or memory, or fewer --threads")
+    })
 }

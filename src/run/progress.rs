@@ -30,6 +30,8 @@ pub trait Progress: Sync {
     fn remark(&self, text: &str);
     /// The step has ended.
     fn end(&self);
+    /// Something that the user should know at once: that another process is waited for, say.
+    fn notice(&self, _text: &str) {}
     /// A stage of several begins, which may have any number of steps; or, without one, what follows is no stage.
     fn stage(&self, _: Option<Stage>) {}
     /// Runs something that writes to the terminal, where no bar may be in its way.

@@ -52,7 +52,7 @@ pub fn expect_same(path: &Path, found: &Map<String, Value>, recipe: &Value) -> R
     let old = found.get("recipe").unwrap_or(&Value::Null);
     let difference = first_difference(old, recipe, "").unwrap_or_else(|| "by another version".to_owned());
     Err(Error::recipe(format!("{} was made by another recipe: {difference}", path.display()))
-        .hint("choose another name for the result, or delete the old one"))
+        .hint("choose another name for the result, or make this one anew by --force"))
 }
 
 fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::Result;
-use crate::run::Context;
+use crate::run::{Context, spawn};
 
 /// Units that may be in flight: one a thread, fewer where memory does not allow it, at least one.
 pub fn in_flight(context: &Context<'_>, unit_bytes: u64) -> usize {
@@ -25,22 +25,24 @@ pub fn for_each<U: Sync, T: Send>(
     let next = AtomicUsize::new(0);
     let failed = std::sync::atomic::AtomicBool::new(false);
     let results: Mutex<Vec<(usize, Result<T>)>> = Mutex::new(Vec::with_capacity(units.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..in_flight.clamp(1, units.len().max(1)) {
-            scope.spawn(|| {
-                loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(unit) = units.get(number) else { break };
-                    if failed.load(Ordering::Relaxed) {
-                        break;
-                    }
-                    let result = context.check_stop().and_then(|()| work(unit));
-                    failed.fetch_or(result.is_err(), Ordering::Relaxed);
-                    results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, result));
-                }
-            });
+    let worker = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(unit) = units.get(number) else { break };
+            if failed.load(Ordering::Relaxed) {
+                break;
+            }
+            let result = context.check_stop().and_then(|()| work(unit));
+            failed.fetch_or(result.is_err(), Ordering::Relaxed);
+            results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, result));
         }
-    });
+    };
+    std::thread::scope(|scope| {
+        let mut workers = 0..in_flight.clamp(1, units.len().max(1));
+        let started = workers.try_for_each(|_| spawn(scope, "unit", worker));
+        failed.fetch_or(started.is_err(), Ordering::Relaxed);
+        started
+    })?;
     let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     results.sort_by_key(|(number, _)| *number);
     results.into_iter().map(|(_, result)| result).collect()

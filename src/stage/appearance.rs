@@ -66,8 +66,7 @@ impl Plan {
 
     /// Fits the appearance, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<AppearanceReport> {
-        self.model.forget(Stage::Appearance, &self.recipe)?;
-        let Some(_lock) = self.model.begin(Stage::Appearance, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Appearance, &self.recipe, context)? else {
             return self.model.report(Stage::Appearance);
         };
         context.progress.begin("appearance", 1, Counted::Items("exemplar"));
@@ -81,7 +80,7 @@ impl Plan {
         let appearance = context.install(|| fit(exemplar, self.tile.wraps, &texels, features, counts));
         self.model.write_appearance(&appearance)?;
         let report = AppearanceReport::new(&appearance, &found, strongest_peak);
-        self.model.finish(Stage::Appearance, &self.recipe, &report)?;
+        self.model.finish(Stage::Appearance, &self.recipe, &report, context)?;
         context.progress.advance(1);
         context.progress.end();
         Ok(report)

@@ -116,6 +116,7 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
         "views": degrees(&description.views),
         "lights": degrees(&description.lights),
         "images": source.check(context)?,
+        "reading": source.reading(),
         "transfer": description.transfer,
         "white": options.white,
         "codec": options.codec.name(),
@@ -170,7 +171,8 @@ impl Plan<'_> {
         let origin =
             Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
         let store = &self.options.store;
-        let measurement = Measurement::create(store, self.description.clone(), self.options.codec, &origin)?;
+        let measurement =
+            Measurement::create(store, self.description.clone(), self.options.codec, &origin, context)?;
         let (found, missing): (Vec<usize>, Vec<usize>) =
             self.views().partition(|&view| measurement.has_view(view));
         context.progress.begin("import", self.images(), Counted::Items("images"));
@@ -200,8 +202,8 @@ impl Plan<'_> {
             }
         }
         if !problems.is_empty() {
-            return Err(Error::input(problems.join("\n"))
-                .hint("replace these images, delete the unfinished store and import again"));
+            return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
+                .hint("replace these images and import again: if they have changed, with --force"));
         }
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
@@ -237,7 +239,11 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
             Err(error) => return Err(error),
         }
     }
-    if problems.is_empty() { Ok(images) } else { Err(Error::input(problems.join("\n"))) }
+    if problems.is_empty() {
+        Ok(images)
+    } else {
+        Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
+    }
 }
 
 /// The store that an archive goes to where none is named: its name with `.zarr`, in a folder.

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::Result;
-use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
+use crate::run::{Context, read_ahead};
 use crate::shape::{Size, Window};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::measurement::Measurement;
@@ -77,7 +77,7 @@ impl Plan {
 
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe, context)? else {
             return self.model.report(Stage::Normals);
         };
         let description = self.measurement.description();
@@ -91,7 +91,7 @@ impl Plan {
         self.model.write_normals(tile.size, &normals)?;
         let (mean, spread_deg) = mean_and_spread(&normals);
         let report = Report { view, lights: description.lights.len(), mean, spread_deg };
-        self.model.finish(Stage::Normals, &self.recipe, &report)?;
+        self.model.finish(Stage::Normals, &self.recipe, &report, context)?;
         Ok(report)
     }
 }
@@ -115,17 +115,22 @@ pub(crate) fn of_window(
         if robust { stereo.robust_normal(&intensities) } else { stereo.normal(&intensities) }
     };
     let mut normals = Vec::with_capacity(window.size.texels());
-    for top in (0..window.size.height).step_by(BAND_ROWS) {
-        context.check_stop()?;
+    let band_bytes = (BAND_ROWS * window.size.width * description.texel_bytes()) as u64;
+    let in_flight = read_ahead::in_flight(context.memory_bytes, band_bytes);
+    let read = |top: usize| {
         let rows = BAND_ROWS.min(window.size.height - top);
         let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
-        let samples = measurement.read_reflectance(view, band)?;
+        Ok((rows, measurement.read_reflectance(view, band)?))
+    };
+    let tops = (0..window.size.height).step_by(BAND_ROWS);
+    read_ahead::for_each(context, in_flight, tops, read, |(rows, samples)| {
         let texels = 0..samples.len() / texel;
         let band: Vec<[f32; 3]> =
             context.install(|| texels.into_par_iter().map(|t| normal(&samples, t * texel)).collect());
         normals.extend(band);
         context.progress.advance(rows as u64);
-    }
+        Ok(())
+    })?;
     Ok(normals)
 }
 

@@ -6,14 +6,13 @@ use btfkit_formats::jpeg::{EncodeOptions, encode};
 use btfkit_formats::ubo2003::{Angles, directions_81, write_name};
 use btfkit_formats::zip::ZipWriter;
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::sample::{Kind, Scene, Surface};
 use crate::shape::Size;
-use crate::store::output;
+use crate::store::output::{self, Made};
 
 /// What to make.
 #[derive(Clone, Debug)]
@@ -35,8 +34,10 @@ pub struct Options {
 }
 
 /// What was made.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Report {
+    /// Whether it was there already.
+    pub made: Made,
     /// Number of images.
     pub images: usize,
     /// Bytes of the archive.
@@ -72,6 +73,9 @@ pub fn directions(count: usize) -> Result<Vec<Angles>> {
 }
 
 /// Renders the material and writes the archive; it appears whole or not at all.
+///
+/// # Errors
+/// [`crate::Kind::Recipe`] where another file is.
 pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let (views, lights) = (directions(options.views)?, directions(options.lights)?);
     let radians = |angles: &Angles| [angles.theta_deg().to_radians(), angles.phi_deg().to_radians()];
@@ -81,7 +85,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));
     let scene = context.install(|| Scene::new(surface, &light_angles));
 
-    output::write_whole(&options.archive, |output| {
+    let made = output::write_whole(&options.archive, context.existing, |output| {
         let mut zip = ZipWriter::new(output);
         for (number, view) in views.iter().enumerate() {
             context.check_stop()?;
@@ -100,17 +104,16 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
             })?;
             for (light, bytes) in images.iter().enumerate() {
                 let name = write_name(light as u32, lights[light], number as u32, *view, views.len() as u32)?;
-                zip.write_entry(&name, bytes)
-                    .map_err(|error| Error::from(error).context(options.archive.display()))?;
+                zip.write_entry(&name, bytes)?;
             }
         }
-        zip.finish().map_err(|error| Error::from(error).context(options.archive.display()))?;
+        zip.finish()?;
         Ok(())
     })?;
     context.progress.end();
     let bytes = std::fs::metadata(&options.archive);
     let bytes = bytes.map_err(|error| Error::io("read", &options.archive, error))?.len();
-    Ok(Report { images: views.len() * lights.len(), bytes })
+    Ok(Report { made, images: views.len() * lights.len(), bytes })
 }
 
 #[cfg(test)]

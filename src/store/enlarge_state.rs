@@ -89,7 +89,7 @@ impl EnlargeState {
         let (found, body) = body.split_at_checked(DIGEST_LENGTH).ok_or_else(ends)?;
         if found != digest.as_bytes() {
             return Err(Error::recipe(format!("{}: the state of another recipe", file.display()))
-                .hint("choose another name for the result, or delete the old one"));
+                .hint("delete this file: the same command then begins again"));
         }
         let (rows, field) = body.split_first_chunk().ok_or_else(ends)?;
         Ok(Self { shard_rows: u64::from_le_bytes(*rows) as usize, field: field.to_vec() })

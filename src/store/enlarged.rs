@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
+use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::store::model::Stage;
-use crate::store::{Array, Layout, Named, Store};
+use crate::store::{Array, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
@@ -65,6 +66,7 @@ pub struct Enlarged {
     index: Array,
     source: Option<Array>,
     normals: Option<Array>,
+    _lock: Option<Lock>,
 }
 
 /// What an enlarged index is, for its attributes.
@@ -95,10 +97,16 @@ impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
     ///
     /// `model` is the model's place; its name is kept, to find it beside the result.
-    pub fn create(path: &Path, description: &Description, recipe: &Value, model: &Path) -> Result<Self> {
+    pub fn create(
+        path: &Path,
+        description: &Description,
+        recipe: &Value,
+        model: &Path,
+        context: &Context<'_>,
+    ) -> Result<Self> {
         let store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
-        store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}))?;
+        let lock = store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}), context)?;
         let Description { size, clusters, .. } = *description;
         let wide = clusters > 256;
         let index = if wide {
@@ -114,7 +122,7 @@ impl Enlarged {
         };
         let source = description.source.map(of_tile).transpose()?;
         let normals = description.keep_normals.then(|| create_normals(&store, size)).transpose()?;
-        Ok(Self { store, size, wide, index, source, normals })
+        Ok(Self { store, size, wide, index, source, normals, _lock: Some(lock) })
     }
 
     /// Opens an enlarged index for reading.
@@ -144,7 +152,15 @@ impl Enlarged {
             }
         }
         let wide = *index.data_type() == u16::data_type();
-        Ok(Self { store, size: Size::new(height as usize, width as usize), wide, index, source, normals })
+        Ok(Self {
+            store,
+            size: Size::new(height as usize, width as usize),
+            wide,
+            index,
+            source,
+            normals,
+            _lock: None,
+        })
     }
 
     /// Our attributes.

@@ -5,10 +5,11 @@
 //! directory is synced: a key holds all of a value or does not exist.
 
 use std::collections::hash_map::RandomState;
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::hash::BuildHasher;
 use std::io::{self, Write};
 use std::ops::Range;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
@@ -22,13 +23,15 @@ use zarrs_storage::{
 
 use crate::error::{Error, Result};
 
-/// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`.
+/// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`. Its writer holds an advisory lock on it: one that can be locked is
+/// abandoned, whatever became of the process and wherever it ran. (Process ids tell nothing: containers share a host's
+/// name and have lists of processes of their own.)
 const TEMPORARY: &str = ".tmp-";
 
 /// Bytes that the system maps around a page that is touched.
 const TOUCHED_TOGETHER: usize = 64 << 10;
 
-/// Age after which a temporary file of another host counts as abandoned.
+/// Age after which a temporary file counts as abandoned on a file system that has no locks.
 const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
 
 /// A directory tree as a Zarr storage.
@@ -48,8 +51,7 @@ impl MappedStorage {
         self.root.join(key.as_str())
     }
 
-    /// Removes what killed writers left behind: temporary files of dead processes of this host,
-    /// and those of other hosts older than a day.
+    /// Removes what killed writers left behind: temporary files that nobody holds.
     pub fn sweep(&self) -> Result<()> {
         let mut folders = vec![self.root.clone()];
         while let Some(folder) = folders.pop() {
@@ -61,11 +63,10 @@ impl MappedStorage {
             for entry in entries {
                 let entry = entry.map_err(|error| Error::io("list", &folder, error))?;
                 let path = entry.path();
-                if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                if entry.file_type().is_ok_and(|kind| kind.is_dir()) && !is_temporary(&path) {
                     folders.push(path);
-                } else if is_abandoned(&path) {
-                    // Another process may sweep the same file at the same time.
-                    let _ = fs::remove_file(&path);
+                } else {
+                    remove_abandoned(&path);
                 }
             }
         }
@@ -79,12 +80,9 @@ fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     // A folder that is made now has to reach the disk as an entry of its parent.
     let made: Vec<&Path> = folder.ancestors().take_while(|folder| !folder.exists()).collect();
     fs::create_dir_all(folder)?;
-    let temporary = temporary_name(path);
-    let written = File::create_new(&temporary).and_then(|mut file| file.write_all(bytes));
-    if let Err(error) = written.and_then(|()| publish(&temporary, path)) {
-        let _ = fs::remove_file(&temporary);
-        return Err(error);
-    }
+    let temporary = Temporary::file(path)?;
+    (&temporary.held).write_all(bytes)?;
+    temporary.publish(path)?;
     made.iter().filter_map(|folder| folder.parent()).try_for_each(|parent| {
         File::open(if parent.as_os_str().is_empty() { Path::new(".") } else { parent })?.sync_all()
     })
@@ -95,6 +93,89 @@ pub(crate) fn publish(temporary: &Path, path: &Path) -> io::Result<()> {
     File::open(temporary)?.sync_all()?;
     fs::rename(temporary, path)?;
     File::open(folder_of(path))?.sync_all()
+}
+
+/// A file or folder that is being made beside the place that it is to have. It holds a lock while it lives; dropped
+/// before it is published, it leaves nothing.
+#[derive(Debug)]
+pub(crate) struct Temporary {
+    path: PathBuf,
+    held: File,
+    is_folder: bool,
+    published: bool,
+}
+
+impl Temporary {
+    /// An empty file.
+    pub(crate) fn file(path: &Path) -> io::Result<Self> {
+        loop {
+            let temporary = temporary_name(path);
+            let held = File::options().create_new(true).read(true).write(true).open(&temporary)?;
+            // A sweep may have come between: it holds the lock while it removes the file.
+            let _ = held.lock();
+            if same_file(&held, &temporary) {
+                return Ok(Self { path: temporary, held, is_folder: false, published: false });
+            }
+        }
+    }
+
+    /// An empty folder; the one that it lies in is made too.
+    pub(crate) fn folder(path: &Path) -> io::Result<Self> {
+        loop {
+            let temporary = temporary_name(path);
+            fs::create_dir_all(&temporary)?;
+            let held = File::open(&temporary)?;
+            let _ = held.lock();
+            if same_file(&held, &temporary) {
+                return Ok(Self { path: temporary, held, is_folder: true, published: false });
+            }
+        }
+    }
+
+    /// Where it lies.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The file, to write to.
+    pub(crate) fn handle(&self) -> io::Result<File> {
+        self.held.try_clone()
+    }
+
+    /// Gives it its name, so that it is there whole after a power failure.
+    pub(crate) fn publish(mut self, path: &Path) -> io::Result<()> {
+        self.held.sync_all()?;
+        fs::rename(&self.path, path)?;
+        self.published = true;
+        File::open(folder_of(path))?.sync_all()
+    }
+
+    /// Removes what killed writers of the same output left beside it.
+    pub(crate) fn sweep_beside(path: &Path) {
+        let begin = format!(".{}{TEMPORARY}", path.file_name().unwrap_or_default().to_string_lossy());
+        for entry in fs::read_dir(folder_of(path)).into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(&begin) {
+                remove_abandoned(&entry.path());
+            }
+        }
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if !self.published {
+            let _ = if self.is_folder { fs::remove_dir_all(&self.path) } else { fs::remove_file(&self.path) };
+        }
+    }
+}
+
+/// Whether an open file is the one that lies at a path.
+pub(crate) fn same_file(file: &File, path: &Path) -> bool {
+    let place = |data: &fs::Metadata| (data.dev(), data.ino());
+    match (file.metadata(), fs::symlink_metadata(path)) {
+        (Ok(a), Ok(b)) => place(&a) == place(&b),
+        _ => false,
+    }
 }
 
 /// The folder that a file lies in.
@@ -127,19 +208,25 @@ pub(crate) fn is_temporary(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().contains(TEMPORARY))
 }
 
-fn is_abandoned(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let Some((_, owner)) = name.rsplit_once(TEMPORARY) else { return false };
-    let mut parts = owner.split('-');
-    let (owner_host, pid) = (parts.next().unwrap_or_default(), parts.next().unwrap_or_default());
-    // Where there is no list of processes only the age tells.
-    let listed = Path::new("/proc/self").exists();
-    let alive = pid == std::process::id().to_string() || Path::new("/proc").join(pid).exists();
-    let dead = owner_host == host() && listed && !alive;
-    let old = fs::metadata(path)
-        .and_then(|data| data.modified())
-        .is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age > ABANDONED_AFTER));
-    dead || old
+/// Removes a temporary file or folder that nobody holds.
+fn remove_abandoned(path: &Path) {
+    if !is_temporary(path) {
+        return;
+    }
+    let Ok(data) = fs::symlink_metadata(path) else { return };
+    let opened = File::options().read(true).write(data.is_file()).open(path);
+    let abandoned = match opened.as_ref().map(File::try_lock) {
+        Ok(Ok(())) => true,
+        Ok(Err(TryLockError::WouldBlock)) | Err(_) => false,
+        Ok(Err(TryLockError::Error(_))) => data
+            .modified()
+            .is_ok_and(|time| SystemTime::now().duration_since(time).is_ok_and(|age| age > ABANDONED_AFTER)),
+    };
+    if abandoned {
+        // Another process may sweep the same at the same time. The lock is held until it is gone.
+        let _ = if data.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+    drop(opened);
 }
 
 /// A file mapped for reading.
@@ -359,15 +446,33 @@ mod tests {
     }
 
     #[test]
-    fn the_sweep_takes_leftovers_of_dead_processes_and_spares_the_living() {
+    fn the_sweep_takes_what_nobody_holds_and_spares_what_is_held_wherever_its_owner_runs() {
         let folder = tempfile::tempdir().unwrap();
-        let dead = folder.path().join(format!(".zarr.json{TEMPORARY}{}-999999999-0a", host()));
-        let elsewhere = folder.path().join(format!(".zarr.json{TEMPORARY}elsewhere-1-0b"));
-        let mine = temporary_name(&folder.path().join("zarr.json"));
-        for path in [&dead, &elsewhere, &mine] {
+        let output = folder.path().join("zarr.json");
+        // As of a process of another host, or of another container of this one.
+        let dead = folder.path().join(format!(".zarr.json{TEMPORARY}elsewhere-1-0a"));
+        let dead_folder = folder.path().join(format!(".zarr.json{TEMPORARY}{}-1-0b", host()));
+        let other = folder.path().join(format!(".other{TEMPORARY}{}-1-0c", host()));
+        let elsewhere = folder.path().join(format!(".zarr.json{TEMPORARY}elsewhere-999999999-0d"));
+        for path in [&dead, &other, &elsewhere] {
             fs::write(path, b"").unwrap();
         }
+        fs::create_dir(&dead_folder).unwrap();
+        fs::write(dead_folder.join("a"), b"").unwrap();
+        let living = File::open(&elsewhere).unwrap();
+        living.lock().unwrap();
+        let [mine, mine_too] = [Temporary::file(&output).unwrap(), Temporary::folder(&output).unwrap()];
+        Temporary::sweep_beside(&output);
+        assert!(!dead.exists() && !dead_folder.exists(), "what nobody holds is swept");
+        assert!(other.exists(), "that of another output is not");
+        assert!(
+            elsewhere.exists() && mine.path().exists() && mine_too.path().exists(),
+            "what is held is spared"
+        );
         MappedStorage::new(folder.path()).sweep().unwrap();
-        assert!(!dead.exists() && elsewhere.exists() && mine.exists());
+        assert!(!other.exists() && elsewhere.exists() && mine.path().exists() && mine_too.path().exists());
+        drop((mine, mine_too, living));
+        MappedStorage::new(folder.path()).sweep().unwrap();
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

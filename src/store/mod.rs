@@ -29,18 +29,22 @@ use zarrs::array::{
 };
 
 use crate::error::{Error, Kind, Result};
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 pub use codec::Chain;
 use codec::Codecs;
 pub use lock::Lock;
 pub(crate) use lock::is_lock;
 use mapped::MappedStorage;
+use output::Existing;
 
 /// Version of the layout on disk, attribute `btfkit.format`.
 pub const FORMAT: u64 = 1;
 
 /// Level of the zstd codec: after level 1 measured data hardly packs better, only slower.
 const ZSTD_LEVEL: i32 = 1;
+
+/// Name of the lock that whoever writes a store by a recipe shares with others who do.
+const WRITING: &str = "-writing";
 
 /// Largest number of bytes that a small array is read or written with at once.
 const WHOLE_ARRAY_LIMIT_BYTES: u64 = 1 << 34;
@@ -158,8 +162,8 @@ impl Store {
     }
 
     /// Waits until no other process holds the lock `name` of this store.
-    pub fn lock(&self, name: &str) -> Result<Lock> {
-        Lock::wait(&self.path, name)
+    pub fn lock(&self, name: &str, context: &Context<'_>) -> Result<Lock> {
+        Lock::wait(&self.path, name, context)
     }
 
     /// Whether an array and all of its chunks (or shards) are there.
@@ -225,10 +229,15 @@ impl Store {
     ///
     /// # Errors
     /// Where there is something else.
-    pub fn begin(&self, kind: &str, attributes: Map<String, Value>) -> Result<Map<String, Value>> {
-        // Looked at before the lock, which leaves a file: none in a folder that is not ours.
+    pub fn begin(
+        &self,
+        kind: &str,
+        attributes: Map<String, Value>,
+        context: &Context<'_>,
+    ) -> Result<Map<String, Value>> {
+        // Looked at before the lock, which makes a file: none in a folder that is not ours.
         self.attributes()?;
-        let _lock = self.lock("")?;
+        let _lock = self.lock("", context)?;
         if self.attributes()?.is_none() {
             let own = [
                 ("kind", json!(kind)),
@@ -242,20 +251,57 @@ impl Store {
     }
 
     /// Begins a store of this kind, or goes on with the one that the same recipe began; `more` are
-    /// attributes beside the recipe.
+    /// attributes beside the recipe. Where results may be replaced, another recipe's store of the same kind is removed.
+    ///
+    /// Returns a lock that keeps others from removing this one; it is to be held while the store is written.
     ///
     /// # Errors
     /// [`Kind::Recipe`] where another recipe's store lies there.
-    pub fn begin_by_recipe(&self, kind: &str, recipe: &Value, more: Value) -> Result<()> {
+    pub fn begin_by_recipe(
+        &self,
+        kind: &str,
+        recipe: &Value,
+        more: Value,
+        context: &Context<'_>,
+    ) -> Result<Lock> {
+        mapped::Temporary::sweep_beside(&self.path);
+        if context.existing == Existing::Replace {
+            self.remove_another(kind, recipe, context)?;
+        }
         let mut attributes = Map::new();
         attributes.insert("recipe".to_owned(), recipe.clone());
         attributes.insert("digest".to_owned(), json!(recipe::digest(recipe)));
         if let Value::Object(more) = more {
             attributes.extend(more);
         }
-        let found = self.begin(kind, attributes)?;
-        recipe::expect_same(&self.path, &found, recipe)?;
-        self.sweep()
+        recipe::expect_same(&self.path, &self.begin(kind, attributes, context)?, recipe)?;
+        let lock = Lock::share(&self.path, WRITING, context)?;
+        // It may have been removed between.
+        recipe::expect_same(&self.path, &self.expect(kind)?, recipe)?;
+        self.sweep()?;
+        Ok(lock)
+    }
+
+    /// Removes another recipe's store of this kind, once nobody writes it any more.
+    fn remove_another(&self, kind: &str, recipe: &Value, context: &Context<'_>) -> Result<()> {
+        let is_another = || -> Result<bool> {
+            if self.attributes()?.is_none() {
+                return Ok(false);
+            }
+            Ok(recipe::expect_same(&self.path, &self.expect(kind)?, recipe).is_err())
+        };
+        if !is_another()? {
+            return Ok(());
+        }
+        let _lock = self.lock(WRITING, context)?;
+        if !is_another()? {
+            return Ok(());
+        }
+        // Moved away first: at no time is there a store with a part of its shards that looks like an unfinished one.
+        let old = mapped::temporary_name(&self.path);
+        let failed = |error| Error::io("remove", &self.path, error);
+        std::fs::rename(&self.path, &old).map_err(failed)?;
+        std::fs::remove_dir_all(&old).map_err(failed)
     }
 
     fn occupied(&self) -> Error {
@@ -289,6 +335,17 @@ impl Store {
             serde_json::to_vec_pretty(&metadata).map_err(|error| Error::internal(error.to_string()))?;
         let file = self.path.join(group).join("zarr.json");
         mapped::write_file(&file, &text)
+    }
+
+    /// Removes an array; nothing where there is none.
+    pub(crate) fn remove(&self, name: &str) -> Result<()> {
+        let path = self.path.join(name);
+        match std::fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io("remove", &path, error))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Makes an array ready to be written chunk by chunk; its metadata is written, its data is not touched.

@@ -13,11 +13,12 @@ use crate::coherent::Appearance;
 use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
 use crate::mrf::Surface;
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 use crate::shape::Size;
 use crate::store::appearance::{self, AppearanceReport};
 use crate::store::field;
 use crate::store::measurement::{Description, read_directions, write_directions};
+use crate::store::output::Existing;
 use crate::store::{Layout, Lock, Named, Store};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
@@ -56,6 +57,16 @@ impl Stage {
         }
     }
 
+    /// The stages that build on it, directly or not, in the order of the data flow.
+    fn builders(self) -> &'static [Self] {
+        match self {
+            Self::Tile => &[Self::Cluster, Self::Normals, Self::Fit, Self::Appearance],
+            Self::Cluster => &[Self::Appearance],
+            Self::Normals => &[Self::Fit],
+            Self::Fit | Self::Appearance => &[],
+        }
+    }
+
     /// Its arrays; `report` is that of the stage.
     fn arrays(self, report: Option<&Value>) -> Vec<String> {
         let levels =
@@ -79,6 +90,11 @@ impl Stage {
     }
 }
 
+/// Name of the lock of a stage.
+fn lock_name(stage: Stage) -> String {
+    format!("-{}", stage.name())
+}
+
 /// A model store.
 pub struct Model {
     store: Store,
@@ -86,11 +102,11 @@ pub struct Model {
 
 impl Model {
     /// Opens a model, or begins one where there is none.
-    pub fn create(path: &Path) -> Result<Self> {
+    pub fn create(path: &Path, context: &Context<'_>) -> Result<Self> {
         let store = Store::at(path);
         let mut attributes = Map::new();
         attributes.insert("stages".to_owned(), json!({}));
-        store.begin(KIND, attributes)?;
+        store.begin(KIND, attributes, context)?;
         store.sweep()?;
         Ok(Self { store })
     }
@@ -133,32 +149,57 @@ impl Model {
     }
 
     /// Begins a stage and holds it against other processes; none where it is done by this recipe and
-    /// its arrays are all there.
+    /// its arrays are all there. Where results may be replaced, what another recipe made is taken back first, and with
+    /// it every stage that builds on it.
     ///
     /// # Errors
     /// Where it has been run by another recipe.
-    pub fn begin(&self, stage: Stage, recipe: &Value) -> Result<Option<Lock>> {
-        let lock = self.store.lock(&format!("-{}", stage.name()))?;
+    pub fn begin(&self, stage: Stage, recipe: &Value, context: &Context<'_>) -> Result<Option<Lock>> {
+        let lock = self.store.lock(&lock_name(stage), context)?;
         self.store.sweep()?;
+        if context.existing == Existing::Replace {
+            self.take_back(stage, recipe, context)?;
+        }
         Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
     }
 
-    /// Takes back that a stage was done by another recipe, so that it can be run anew. For stages that cost little and
-    /// that no other stage builds on; what was made of them names their digest.
-    ///
-    /// # Errors
-    /// Reading and writing.
-    pub fn forget(&self, stage: Stage, recipe: &Value) -> Result<()> {
-        let _lock = self.store.lock("")?;
-        let mut attributes = self.store.expect(KIND)?;
-        let stages = attributes.get_mut("stages").and_then(Value::as_object_mut);
-        let Some(stages) = stages else { return Ok(()) };
-        let found = stages.get(stage.name()).and_then(|entry| entry.get("digest")).and_then(Value::as_str);
-        if found.is_none() || found == Some(recipe::digest(recipe).as_str()) {
+    /// Takes back a stage that another recipe made, and those that build on it: their entries first, then their arrays.
+    fn take_back(&self, stage: Stage, recipe: &Value, context: &Context<'_>) -> Result<()> {
+        let Some(entry) = self.stage(stage)? else { return Ok(()) };
+        if entry.get("digest").and_then(Value::as_str) == Some(recipe::digest(recipe).as_str()) {
             return Ok(());
         }
-        stages.remove(stage.name());
-        self.store.write_group("", attributes)
+        // In the order of the data flow, as everybody takes them.
+        let _later: Vec<Lock> = stage
+            .builders()
+            .iter()
+            .map(|&stage| self.store.lock(&lock_name(stage), context))
+            .collect::<Result<_>>()?;
+        let mut arrays = Vec::new();
+        {
+            let _lock = self.store.lock("", context)?;
+            let mut attributes = self.store.expect(KIND)?;
+            let stages = attributes.get_mut("stages").and_then(Value::as_object_mut);
+            let Some(stages) = stages else { return Ok(()) };
+            for taken in stage.builders().iter().chain([&stage]) {
+                if let Some(entry) = stages.remove(taken.name()) {
+                    arrays.extend(taken.arrays(entry.get("report")));
+                    if *taken != stage {
+                        context.progress.notice(&format!(
+                            "{}: stage {} built on what is made anew: run it again (btf {}, or btf model)",
+                            self.path().display(),
+                            taken.name(),
+                            taken.name()
+                        ));
+                    }
+                }
+            }
+            self.store.write_group("", attributes)?;
+        }
+        for array in arrays {
+            self.store.remove(&array)?;
+        }
+        Ok(())
     }
 
     /// Whether a stage is done by this recipe, and its arrays are all there.
@@ -173,9 +214,15 @@ impl Model {
     }
 
     /// Declares a stage done; to be called after its arrays are written.
-    pub fn finish(&self, stage: Stage, recipe: &Value, report: &impl serde::Serialize) -> Result<()> {
+    pub fn finish(
+        &self,
+        stage: Stage,
+        recipe: &Value,
+        report: &impl serde::Serialize,
+        context: &Context<'_>,
+    ) -> Result<()> {
         // Another stage may be writing its own entry.
-        let _lock = self.store.lock("")?;
+        let _lock = self.store.lock("", context)?;
         let mut attributes = self.store.expect(KIND)?;
         let report = serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))?;
         let entry = json!({"recipe": recipe, "digest": recipe::digest(recipe), "report": report});

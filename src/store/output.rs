@@ -1,39 +1,276 @@
-//! Files and folders outside a store that appear whole or not at all.
+//! Files and folders outside a store that appear whole or not at all, and that never replace what is there unasked.
+//!
+//! What exists already is compared while it is made again, byte by byte: the same is found done, anything else is refused
+//! at the first byte that differs. Only on request ([`Existing::Replace`]) a new one takes its place.
 
+use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-use super::mapped::temporary_name;
-use crate::error::{Error, Result};
+use super::mapped::{Temporary, publish, temporary_name, write_file};
+use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
 const BUFFER_BYTES: usize = 1 << 20;
 
-/// Writes a file front to back by `write`; it gets its name when that is done.
-pub fn write_whole(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<()>) -> Result<()> {
-    let failed = |error| Error::io("write", path, error);
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder).map_err(failed)?;
+/// What to do about a file that has the name of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it as it is: found done if it is the result, else refused.
+    #[default]
+    Keep,
+    /// Put the result in its place.
+    Replace,
+}
+
+impl Existing {
+    /// Refuses a name that is taken, before any work: for results that are not compared.
+    ///
+    /// # Errors
+    /// [`Kind::Recipe`].
+    pub fn expect_free(self, path: &Path) -> Result<()> {
+        match self {
+            Self::Keep if is_there(path) => Err(taken(path, "exists")),
+            Self::Replace if path.is_dir() => Err(Error::recipe(format!("{} is a folder", path.display()))
+                .hint("choose another name for the result")),
+            _ => Ok(()),
+        }
     }
-    let temporary = temporary_name(path);
-    let written = File::create_new(&temporary).map_err(failed).and_then(|file| {
-        let mut output = BufWriter::with_capacity(BUFFER_BYTES, file);
-        write(&mut output)?;
-        output.flush().map_err(failed)?;
-        output.get_ref().sync_all().map_err(failed)
-    });
-    written.and_then(|()| fs::rename(&temporary, path).map_err(failed)).inspect_err(|_| {
-        let _ = fs::remove_file(&temporary);
-    })
+}
+
+/// How a result came to be there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Made {
+    /// Written by this run.
+    Written,
+    /// It was there already, the same to the byte.
+    Found,
+}
+
+/// Whether anything has this name, a link that leads nowhere too.
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
+fn taken(path: &Path, how: &str) -> Error {
+    Error::recipe(format!("{} {how}", path.display())).hint("choose another name, or replace it by --force")
+}
+
+/// A file that is written from front to back, or compared with the one that is there.
+pub struct Output {
+    to: To,
+}
+
+enum To {
+    File(BufWriter<File>),
+    Compare(BufReader<File>),
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match &mut self.to {
+            To::File(file) => file.write(bytes),
+            To::Compare(file) => {
+                let mut found = [0; 4096];
+                let part = &bytes[..bytes.len().min(found.len())];
+                let found = &mut found[..part.len()];
+                match file.read_exact(found) {
+                    Ok(()) if found == part => Ok(part.len()),
+                    Ok(()) => Err(io::Error::new(io::ErrorKind::AlreadyExists, Different)),
+                    Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+                        Err(io::Error::new(io::ErrorKind::AlreadyExists, Different))
+                    }
+                    Err(error) => Err(error),
+                }
+            }
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match &mut self.to {
+            To::File(file) => file.flush(),
+            To::Compare(_) => Ok(()),
+        }
+    }
+}
+
+impl Seek for Output {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match &mut self.to {
+            To::File(file) => file.seek(to),
+            To::Compare(file) => file.seek(to),
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Different;
+
+impl std::fmt::Display for Different {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("exists and holds something else")
+    }
+}
+
+impl std::error::Error for Different {}
+
+/// Writes a file by `write`; it gets its name when that is done.
+///
+/// # Errors
+/// Those of `write`, and [`Kind::Recipe`] where another file has the name.
+pub fn write_whole(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&mut Output) -> Result<()>,
+) -> Result<Made> {
+    let failed = |error| Error::io("write", path, error);
+    if existing == Existing::Keep && is_there(path) {
+        return compare(path, write);
+    }
+    existing.expect_free(path)?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(failed)?;
+    Temporary::sweep_beside(path);
+    let temporary = Temporary::file(path).map_err(failed)?;
+    let file = temporary.handle().map_err(failed)?;
+    let mut output = Output { to: To::File(BufWriter::with_capacity(BUFFER_BYTES, file)) };
+    write(&mut output).map_err(|error| error.at(path))?;
+    output.flush().map_err(failed)?;
+    drop(output);
+    // Another may have taken the name meanwhile.
+    existing.expect_free(path)?;
+    temporary.publish(path).map_err(failed)?;
+    Ok(Made::Written)
+}
+
+/// Compares a file that is there with what `write` writes.
+fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<Made> {
+    let failed = |error| Error::io("read", path, error);
+    if !path.is_file() {
+        return Err(taken(path, "exists and is no file").hint("choose another name for the result"));
+    }
+    let length = fs::metadata(path).map_err(failed)?.len();
+    let file = BufReader::with_capacity(BUFFER_BYTES, File::open(path).map_err(failed)?);
+    let mut output = Output { to: To::Compare(file) };
+    let written = write(&mut output);
+    let different =
+        |error: &Error| error.kind() == Kind::Io && error.to_string().contains(&Different.to_string());
+    match written {
+        Err(error) if different(&error) => return Err(taken(path, &Different.to_string())),
+        other => other?,
+    }
+    // What was written last need not be the end: some formats go back to their head.
+    let end = output.seek(SeekFrom::End(0)).map_err(failed)?;
+    if end == length { Ok(Made::Found) } else { Err(taken(path, &Different.to_string())) }
+}
+
+/// A folder that is filled, or compared with the one that is there.
+pub struct Folder {
+    root: PathBuf,
+    compared: bool,
+    names: Mutex<BTreeSet<PathBuf>>,
+}
+
+impl Folder {
+    /// Puts a file into it; `name` is relative.
+    pub fn put(&self, name: &Path, bytes: &[u8]) -> Result<()> {
+        self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(name.to_owned());
+        let path = self.root.join(name);
+        if !self.compared {
+            return write_file(&path, bytes);
+        }
+        match fs::read(&path) {
+            Ok(found) if found == bytes => Ok(()),
+            Ok(_) => Err(different_folder(&self.root)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(different_folder(&self.root)),
+            Err(error) => Err(Error::io("read", &path, error)),
+        }
+    }
+
+    /// Whether a folder holds no file but those that were put into this one.
+    fn holds_all_of(&self, folder: &Path) -> Result<bool> {
+        let names = self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut folders = vec![folder.to_owned()];
+        while let Some(at) = folders.pop() {
+            for entry in fs::read_dir(&at).map_err(|error| Error::io("list", &at, error))? {
+                let entry = entry.map_err(|error| Error::io("list", &at, error))?;
+                if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                    folders.push(entry.path());
+                } else if !entry.path().strip_prefix(folder).is_ok_and(|name| names.contains(name)) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn different_folder(path: &Path) -> Error {
+    taken(path, "exists and holds something else")
 }
 
 /// Fills a folder by `write`; it gets its name when that is done.
-pub fn write_whole_folder(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+///
+/// # Errors
+/// Those of `write`, and [`Kind::Recipe`] where there is another folder. Only one that holds nothing but files that the
+/// new one has too is ever replaced.
+pub fn write_whole_folder(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&Folder) -> Result<()>,
+) -> Result<Made> {
     let failed = |error| Error::io("write", path, error);
-    let temporary = temporary_name(path);
-    let written = fs::create_dir_all(&temporary).map_err(failed).and_then(|()| write(&temporary));
-    written.and_then(|()| fs::rename(&temporary, path).map_err(failed)).inspect_err(|_| {
-        let _ = fs::remove_dir_all(&temporary);
+    let occupied = is_there(path);
+    let folder = |root: &Path, compared| Folder { root: root.to_owned(), compared, names: Mutex::default() };
+    if occupied && !path.is_dir() {
+        return Err(taken(path, "exists and is no folder").hint("choose another name for the result"));
+    }
+    if occupied && existing == Existing::Keep {
+        let found = folder(path, true);
+        write(&found)?;
+        return if found.holds_all_of(path)? { Ok(Made::Found) } else { Err(different_folder(path)) };
+    }
+    Temporary::sweep_beside(path);
+    let temporary = Temporary::folder(path).map_err(failed)?;
+    let filled = folder(temporary.path(), false);
+    write(&filled).map_err(|error| error.at(path))?;
+    if occupied {
+        if !filled.holds_all_of(path)? {
+            return Err(Error::recipe(format!(
+                "{} holds other files too, so it is not replaced",
+                path.display()
+            ))
+            .hint("choose another name for the result"));
+        }
+        let old = temporary_name(path);
+        fs::rename(path, &old).map_err(failed)?;
+        temporary.publish(path).map_err(failed)?;
+        fs::remove_dir_all(&old).map_err(failed)?;
+        return Ok(Made::Written);
+    }
+    temporary.publish(path).map_err(failed)?;
+    Ok(Made::Written)
+}
+
+/// Writes the bytes of a small file whose name must be free, or may be replaced.
+pub fn write_new(path: &Path, existing: Existing, bytes: &[u8]) -> Result<Made> {
+    write_whole(path, existing, |output| {
+        output.write_all(bytes).map_err(|error| Error::io("write", path, error))
+    })
+}
+
+/// Gives a file that another library wrote its name, under the same rule as [`write_whole`].
+pub fn settle(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
+    if existing == Existing::Replace || !is_there(path) {
+        existing.expect_free(path)?;
+        publish(temporary, path).map_err(|error| Error::io("write", path, error))?;
+        return Ok(Made::Written);
+    }
+    let failed = |error| Error::io("read", path, error);
+    let mut made = BufReader::with_capacity(BUFFER_BYTES, File::open(temporary).map_err(failed)?);
+    compare(path, |output| {
+        io::copy(&mut made, output).map(|_| ()).map_err(|error| Error::io("write", path, error))
     })
 }

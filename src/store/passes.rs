@@ -17,7 +17,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::store::{Layout, Store};
+use crate::run::Context;
+use crate::store::{Layout, Lock, Store};
 use crate::texel::cluster::centre::CentreRule;
 use crate::texel::cluster::lloyd::Pass;
 use crate::texel::cluster::nearest::{Farthest, Near, nearer};
@@ -30,6 +31,7 @@ pub const KIND: &str = "clustering";
 /// The passes of a clustering.
 pub struct Passes {
     store: Store,
+    _lock: Lock,
 }
 
 /// What a pass begins with.
@@ -111,10 +113,10 @@ impl Passes {
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's lie there.
-    pub fn create(path: &Path, recipe: &Value) -> Result<Self> {
+    pub fn create(path: &Path, recipe: &Value, context: &Context<'_>) -> Result<Self> {
         let store = Store::at(path);
-        store.begin_by_recipe(KIND, recipe, json!({}))?;
-        Ok(Self { store })
+        let lock = store.begin_by_recipe(KIND, recipe, json!({}), context)?;
+        Ok(Self { store, _lock: lock })
     }
 
     /// Removes all of it, as far as no other process is writing there: what is left is never read again, and

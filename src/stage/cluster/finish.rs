@@ -80,7 +80,7 @@ impl Plan {
             tile_bytes: description.bytes() / description.size.texels() as u64 * texels as u64,
             measurement_bytes: description.bytes(),
         };
-        self.model.finish(Stage::Cluster, &self.recipe, &report)?;
+        self.model.finish(Stage::Cluster, &self.recipe, &report, context)?;
         Passes::remove(&self.model.path().join(PASSES));
         Ok(report)
     }

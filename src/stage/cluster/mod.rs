@@ -294,8 +294,8 @@ impl Plan {
         self.options.time.and_then(|time| Instant::now().checked_add(time))
     }
 
-    fn passes(&self) -> Result<Passes> {
-        Passes::create(&self.model.path().join(PASSES), &self.recipe)
+    fn passes(&self, context: &Context<'_>) -> Result<Passes> {
+        Passes::create(&self.model.path().join(PASSES), &self.recipe, context)
     }
 
     /// Views and lights.
@@ -305,14 +305,14 @@ impl Plan {
 
     /// Clusters the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe, context)? else {
             return self.done();
         };
         let deadline = self.deadline();
         if self.fits_the_sample() {
             return self.run_in_memory(deadline, context);
         }
-        let passes = self.passes()?;
+        let passes = self.passes(context)?;
         let (mut pass, mut state) = match passes.latest()? {
             Some(pass) => (pass, passes.state(pass, self.brdf(), self.selection.texels())?),
             None => self.prepare(&passes, deadline, context)?,
@@ -362,10 +362,12 @@ impl Plan {
         let _lock = match step {
             Step::Assign(..) if self.model.is_done(Stage::Cluster, &self.recipe)? => return done(),
             Step::Assign(..) => None,
-            Step::Prepare | Step::Reduce(_) => match self.model.begin(Stage::Cluster, &self.recipe)? {
-                Some(lock) => Some(lock),
-                None => return done(),
-            },
+            Step::Prepare | Step::Reduce(_) => {
+                match self.model.begin(Stage::Cluster, &self.recipe, context)? {
+                    Some(lock) => Some(lock),
+                    None => return done(),
+                }
+            }
         };
         if self.fits_the_sample() {
             return match step {
@@ -377,7 +379,7 @@ impl Plan {
                 .hint("run --step prepare first")),
             };
         }
-        let passes = self.passes()?;
+        let passes = self.passes(context)?;
         let latest = passes.latest()?;
         let begun = |asked: Option<usize>| match latest {
             Some(latest) if asked.is_none_or(|asked| asked <= latest) => Ok(latest),

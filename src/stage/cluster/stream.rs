@@ -2,12 +2,11 @@
 //! allows.
 
 use std::ops::Range;
-use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::run::Context;
+use crate::run::{Context, read_ahead};
 use crate::store::measurement::Measurement;
 use crate::texel::cluster::points::Arrangement;
 use crate::texel::cluster::selection::{Block, Selection};
@@ -40,7 +39,8 @@ impl<'a> Stream<'a> {
     pub(super) fn bytes_in_flight(selection: &Selection, arrangement: &Arrangement) -> usize {
         let texels = selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(0);
         let window = selection.blocks().iter().map(|block| block.window.size.texels()).max().unwrap_or(0);
-        2 * texels * arrangement.stride() + window * arrangement.cosines().len() * arrangement.lights()
+        read_ahead::IN_FLIGHT * texels * arrangement.stride()
+            + window * arrangement.cosines().len() * arrangement.lights()
     }
 
     /// Calls `work` with each block of `blocks` and its vectors [slot, stride], in their order, on the pool.
@@ -53,29 +53,15 @@ impl<'a> Stream<'a> {
         let Self { measurement, arrangement, selection, ref mut kept } = *self;
         let absent: Vec<usize> =
             blocks.clone().filter(|&number| !kept.get(number).is_some_and(Option::is_some)).collect();
-        // One block is handed over while the next is read; the channel itself holds none.
-        let (sender, receiver) = sync_channel(0);
-        std::thread::scope(|scope| {
-            scope.spawn(move || {
-                for number in absent {
-                    let block = &selection.blocks()[number];
-                    let vectors = context
-                        .check_stop()
-                        .and_then(|()| context.install(|| read(measurement, arrangement, selection, block)));
-                    let failed = vectors.is_err();
-                    // Nobody listens any more once the work has failed.
-                    if sender.send(vectors).is_err() || failed {
-                        break;
-                    }
-                }
-            });
+        let read = |number: usize| read(measurement, arrangement, selection, &selection.blocks()[number]);
+        read_ahead::with(context, read_ahead::IN_FLIGHT, absent, read, |absent| {
             for number in blocks {
                 context.check_stop()?;
                 let block = &selection.blocks()[number];
                 if let Some(Some(vectors)) = kept.get(number) {
                     context.install(|| work(block, vectors))?;
                 } else {
-                    let vectors = receiver.recv().unwrap_or_else(|_| Err(crate::Error::stopped()))?;
+                    let vectors = absent.next().unwrap_or_else(|| Err(crate::Error::stopped()))?;
                     context.install(|| work(block, &vectors))?;
                     if let Some(kept) = kept.get_mut(number) {
                         *kept = Some(vectors);
@@ -83,7 +69,6 @@ impl<'a> Stream<'a> {
                 }
                 context.progress.advance(block.slots.len() as u64);
             }
-            drop(receiver);
             Ok(())
         })
     }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
+use crate::run::Context;
 use crate::stage::cluster::{METHOD, Report, measurement_of};
 use crate::store::model::{Model, Stage};
 
@@ -61,8 +62,8 @@ impl Plan {
     ///
     /// # Errors
     /// Where a texel of the tile is not in the other one.
-    pub fn run(&self) -> Result<Report> {
-        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe)? else {
+    pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe, context)? else {
             return self.model.report(Stage::Cluster);
         };
         let (tile, other) = (self.model.tile()?, self.from.tile()?);
@@ -92,7 +93,7 @@ impl Plan {
             tile_bytes: of_other.tile_bytes / (other.size.texels() as u64) * texels,
             ..of_other
         };
-        self.model.finish(Stage::Cluster, &self.recipe, &report)?;
+        self.model.finish(Stage::Cluster, &self.recipe, &report, context)?;
         Ok(report)
     }
 }

@@ -9,6 +9,7 @@ mod page;
 mod place;
 pub mod pyramid;
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,9 +20,9 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::picture;
-use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
+use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
 use crate::store::mapped::write_file;
@@ -141,7 +142,7 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
         "tile_side": side,
         "overlap": overlap,
     });
-    place.check(&recipe)?;
+    place.check(&recipe, context.existing)?;
     let pyramid = Pyramid { size: scene.size(), side, overlap };
     Ok(Plan { scene, pyramid, encoding: options.encoding, place, recipe })
 }
@@ -176,7 +177,7 @@ impl Plan {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
         let left = context.memory_bytes.saturating_sub(needed);
-        let bands = self.scene.bands(left).map_err(|_| {
+        let (in_flight, bands) = self.scene.bands_in_flight(left).map_err(|_| {
             Error::usage(format!(
                 "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
                 window.size.width,
@@ -185,21 +186,20 @@ impl Plan {
             ))
             .hint("allow a larger --memory, or make smaller tiles by --tile-size")
         })?;
-        self.place.begin(&self.recipe)?;
+        self.place.begin(&self.recipe, context)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
         let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };
         if !self.is_whole() {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
             let mut pixels = vec![[0.0; 3]; window.size.width];
-            for rows in bands {
-                context.check_stop()?;
-                let band = self.scene.read(rows.clone(), context)?;
-                for row in 0..rows.len() {
+            let read = |rows: Range<usize>| Ok((rows.len(), self.scene.read(rows, context)?));
+            read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
+                (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
-                    cascade.push(&self.pyramid, &pixels, &tiles)?;
-                }
-            }
+                    cascade.push(&self.pyramid, &pixels, &tiles)
+                })
+            })?;
         } else {
             tiles.found.store(total, Ordering::Relaxed);
         }

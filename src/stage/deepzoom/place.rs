@@ -3,14 +3,16 @@
 //! `NAME_files/btfkit.json` holds the recipe and is written first; `NAME.dzi` is written last, so that it is there
 //! only once all tiles are. Every file appears whole or not at all: a tile that is there is done.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
 use super::Encoding;
 use crate::error::{Error, Result};
-use crate::run::recipe;
-use crate::store::mapped::{self, MappedStorage, write_file};
+use crate::run::{Context, recipe};
+use crate::store::mapped::{self, MappedStorage, Temporary, write_file};
+use crate::store::output::Existing;
 use crate::store::{Store, is_lock};
 
 /// Name of the file with the recipe.
@@ -52,11 +54,18 @@ impl Place {
         self.folder.join(level.to_string()).join(format!("{column}_{row}.{}", self.ending))
     }
 
-    /// Checks that nothing lies there, or what the same recipe began.
+    /// Checks that nothing lies there, or what the same recipe began, or what may be replaced.
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] for another recipe's pyramid, [`crate::Kind::Input`] for other files.
-    pub(super) fn check(&self, recipe: &Value) -> Result<()> {
+    pub(super) fn check(&self, recipe: &Value, existing: Existing) -> Result<()> {
+        match self.compare(recipe) {
+            Err(error) if existing == Existing::Replace && error.kind() == crate::Kind::Recipe => Ok(()),
+            other => other,
+        }
+    }
+
+    fn compare(&self, recipe: &Value) -> Result<()> {
         let path = self.folder.join(STATE);
         match std::fs::read(&path) {
             Ok(text) => {
@@ -78,18 +87,21 @@ impl Place {
         match occupied {
             Some((path, _)) => {
                 Err(Error::input(format!("{} exists and is not of a pyramid begun here", path.display()))
-                    .hint("choose another name, or delete it"))
+                    .hint("choose another name for the result"))
             }
             None => Ok(()),
         }
     }
 
     /// Writes the recipe, unless it is there, and removes what killed writers left.
-    pub(super) fn begin(&self, recipe: &Value) -> Result<()> {
+    pub(super) fn begin(&self, recipe: &Value, context: &Context<'_>) -> Result<()> {
+        if context.existing == Existing::Replace {
+            self.remove_another(recipe)?;
+        }
         // Looked at before the lock, which leaves a file: none in a folder that is not ours.
-        self.check(recipe)?;
-        let _lock = Store::at(&self.folder).lock("")?;
-        self.check(recipe)?;
+        self.compare(recipe)?;
+        let _lock = Store::at(&self.folder).lock("", context)?;
+        self.compare(recipe)?;
         MappedStorage::new(&self.folder).sweep()?;
         let path = self.folder.join(STATE);
         if path.exists() {
@@ -103,12 +115,36 @@ impl Place {
         write_file(&path, &text)
     }
 
+    /// Removes another recipe's pyramid.
+    fn remove_another(&self, recipe: &Value) -> Result<()> {
+        let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::Kind::Recipe);
+        if !is_another || !self.folder.join(STATE).is_file() {
+            return Ok(());
+        }
+        Temporary::sweep_beside(&self.folder);
+        // The description first: without it there is no pyramid.
+        for path in [&self.description, &self.page] {
+            match std::fs::remove_file(path) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(Error::io("remove", path, error));
+                }
+                _ => {}
+            }
+        }
+        let old = mapped::temporary_name(&self.folder);
+        let failed = |error| Error::io("remove", &self.folder, error);
+        std::fs::rename(&self.folder, &old).map_err(failed)?;
+        std::fs::remove_dir_all(&old).map_err(failed)
+    }
+
     /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.
     pub(super) fn write_beside(&self, path: &Path, text: &str) -> Result<()> {
         let name = path.file_name().unwrap_or_default();
-        let temporary = mapped::temporary_name(&self.folder.join(name));
-        std::fs::write(&temporary, text)
-            .and_then(|()| mapped::publish(&temporary, path))
-            .map_err(|error| Error::io("write", path, error))
+        let written = || {
+            let temporary = Temporary::file(&self.folder.join(name))?;
+            temporary.handle()?.write_all(text.as_bytes())?;
+            temporary.publish(path)
+        };
+        written().map_err(|error| Error::io("write", path, error))
     }
 }

@@ -60,14 +60,19 @@ impl Tile {
     }
 
     /// Starts an output, or goes on with it.
-    pub(super) fn create(&self, subject: &Subject, output: &Output) -> Result<Enlarged> {
+    pub(super) fn create(
+        &self,
+        subject: &Subject,
+        output: &Output,
+        context: &Context<'_>,
+    ) -> Result<Enlarged> {
         let description = Description {
             size: subject.options.size,
             clusters: subject.clusters.clusters,
             source: self.kept.source.then_some(subject.tile),
             keep_normals: self.kept.normals,
         };
-        Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model)
+        Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model, context)
     }
 
     /// Writes a window of shards, `source` being the tile's texels in it.
@@ -101,7 +106,7 @@ pub(super) fn make(
     context: &Context<'_>,
     source: impl Fn(Window) -> Result<Vec<u32>> + Sync,
 ) -> Result<Units> {
-    let store = tile.create(subject, output)?;
+    let store = tile.create(subject, output, context)?;
     let blocks: Vec<Window> = blocks(subject.options.size, BLOCK_SHARDS)
         .enumerate()
         .filter(|(number, _)| subject.options.shard.has(*number))

@@ -93,7 +93,8 @@ impl Paper {
             Synthesis::new(&self.surface.field, output.seed, height, width, extent(subject), shared.kernel)?;
         let description =
             Description { size, clusters: subject.clusters.clusters, source: None, keep_normals };
-        let store = Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model)?;
+        let store =
+            Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model, context)?;
         let state = EnlargeState::read(&output.path, &digest)?;
         let shard_rows = store.shards().height;
         let found = match &state {

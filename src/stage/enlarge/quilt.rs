@@ -49,7 +49,7 @@ impl Quilting {
     /// Makes one output.
     fn make_one(&self, subject: &Subject, output: &Output, context: &Context<'_>) -> Result<Units> {
         let super::Options { size, tileable, .. } = subject.options;
-        let store = self.tile.create(subject, output)?;
+        let store = self.tile.create(subject, output, context)?;
         let shard_rows: Vec<Window> = (0..size.height)
             .step_by(SHARD_SIDE)
             .map(|y| Window { y, x: 0, size: Size::new(SHARD_SIDE.min(size.height - y), size.width) })

@@ -5,7 +5,7 @@ use std::io::Write;
 use btfkit_formats::bonn::{self, ColorModel, Scalar, Writer};
 use btfkit_formats::{SampleType, Samples};
 
-use super::{Options, for_each_view, linear};
+use super::{Options, Written, for_each_view, linear};
 use crate::error::{Error, Result};
 use crate::factor::{self, Block, Factors, Identity, Size, identity_rows};
 use crate::run::Context;
@@ -21,11 +21,7 @@ const BAND_LIMIT_BYTES: usize = 256 << 20;
 const BAND_ROWS: usize = 16;
 
 /// One factorisation a channel.
-pub(super) fn dfmf(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Vec<String>> {
+pub(super) fn dfmf(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = describe(measurement);
     let scalar = scalar(measurement);
     let channels = description.channels.len();
@@ -39,7 +35,7 @@ pub(super) fn dfmf(
         None => vec![vec![1.0; size.full_rank()]; channels],
     };
     let rank = values.iter().map(Vec::len).max().unwrap_or(0);
-    output::write_whole(&options.output, |output| {
+    let made = output::write_whole(&options.output, context.existing, |output| {
         let mut writer = Writer::dfmf(output, &description, scalar, &ColorModel::Rgb, &values)?;
         match &factors {
             Some(factors) => factors.iter().try_for_each(|factors| push(&mut writer, factors))?,
@@ -49,21 +45,17 @@ pub(super) fn dfmf(
         writer.finish()?;
         Ok(())
     })?;
-    Ok(description.obstacles_elsewhere(scalar, rank))
+    Ok((made, description.obstacles_elsewhere(scalar, rank)))
 }
 
 /// One factorisation of all channels.
-pub(super) fn fmf(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Vec<String>> {
+pub(super) fn fmf(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = describe(measurement);
     let scalar = scalar(measurement);
     let size = matrix_size(measurement, description.channels.len());
     let factors = options.rank.map(|rank| truncated(measurement, Part::All, rank, context)).transpose()?;
     let values = factors.as_ref().map_or(vec![1.0; size.full_rank()], |f| f.singular_values.clone());
-    output::write_whole(&options.output, |output| {
+    let made = output::write_whole(&options.output, context.existing, |output| {
         let mut writer = Writer::fmf(output, &description, scalar, &values, false)?;
         match &factors {
             Some(factors) => push(&mut writer, factors)?,
@@ -72,7 +64,7 @@ pub(super) fn fmf(
         writer.finish()?;
         Ok(())
     })?;
-    Ok(description.obstacles_elsewhere(scalar, values.len()))
+    Ok((made, description.obstacles_elsewhere(scalar, values.len())))
 }
 
 /// Which channels a factorisation is of.

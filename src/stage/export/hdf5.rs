@@ -2,19 +2,15 @@
 
 use btfkit_formats::Contents;
 
-use super::Options;
+use super::{Options, Written};
 use crate::color::Transfer;
 use crate::error::Result;
 use crate::hdf5::Writer;
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::store::measurement::Measurement;
 
-pub(super) fn write(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Vec<String>> {
+pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = measurement.description();
     let contents = Contents {
         format: "measurement store".to_owned(),
@@ -29,15 +25,21 @@ pub(super) fn write(
         assumptions: Vec::new(),
         remarks: Vec::new(),
     };
-    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?;
+    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?
+        .with_existing(context.existing);
     let whole = description.size.window();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
-    for view in 0..description.views.len() {
-        context.check_stop()?;
+    let codes = (description.size.texels() * description.lights.len()) as u64;
+    let in_flight = read_ahead::in_flight(context.memory_bytes, description.view_bytes() + codes);
+    let read = |view| {
         let samples = measurement.read_reflectance(view, whole)?;
-        writer.write_view(view, &samples, Some(&measurement.read_luminance(view, whole)?))?;
+        Ok((view, samples, measurement.read_luminance(view, whole)?))
+    };
+    read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, samples, codes)| {
+        writer.write_view(view, &samples, Some(&codes))?;
         context.progress.advance(1);
-    }
-    writer.finish()?;
-    Ok(Vec::new())
+        Ok(())
+    })?;
+    let made = writer.finish()?;
+    Ok((made, Vec::new()))
 }

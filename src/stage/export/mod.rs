@@ -9,14 +9,14 @@ mod pictures;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::{SampleType, Samples, f16};
-use serde::Serialize;
 
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
+use crate::store::output::Made;
 
 /// What to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,18 +51,23 @@ pub struct Options {
 }
 
 /// What was written.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Report {
+    /// Whether it was there already.
+    pub made: Made,
     /// Bytes of all files.
     pub bytes: u64,
     /// What other programs will not like, a sentence each.
     pub warnings: Vec<String>,
 }
 
+/// Whether it was there already, and what other programs will not like.
+type Written = (Made, Vec<String>);
+
 /// Writes a whole measurement as an archive.
 ///
 /// # Errors
-/// A measurement that is not complete, or that the format cannot hold; an output that exists.
+/// A measurement that is not complete, or that the format cannot hold; [`crate::Kind::Recipe`] where other files are.
 pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
     let views = measurement.description().views.len();
     let done = measurement.views_done();
@@ -70,11 +75,7 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         let found = format!("{}: {done} of {views} views are there", measurement.path().display());
         return Err(Error::missing(found).hint("finish its import first"));
     }
-    if options.output.exists() {
-        return Err(Error::input(format!("{} exists", options.output.display()))
-            .hint("choose another name, or delete it"));
-    }
-    let warnings = match options.format {
+    let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
         Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,
         Format::Png => pictures::folder(measurement, options, pictures::Kind::Png, context)?,
@@ -84,14 +85,14 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         Format::Fmf => bonn::fmf(measurement, options, context)?,
     };
     context.progress.end();
-    Ok(Report { bytes: bytes_of(&options.output), warnings })
+    Ok(Report { made, bytes: bytes_of(&options.output), warnings })
 }
 
 #[cfg(feature = "hdf5")]
 use self::hdf5::write as hdf5;
 
 #[cfg(not(feature = "hdf5"))]
-fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Vec<String>> {
+fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Written> {
     Err(crate::hdf5::not_built_in(&options.output))
 }
 
@@ -112,13 +113,17 @@ fn for_each_view(
 ) -> Result<()> {
     let description = measurement.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
-    for view in 0..description.views.len() {
-        context.check_stop()?;
+    // Read as texels, then turned.
+    let in_flight = read_ahead::in_flight(context.memory_bytes, 2 * description.view_bytes());
+    let read = |view| {
         let texels = measurement.read_reflectance(view, description.size.window())?;
-        each(view, images_of_texels(&texels, description.lights.len(), description.n_channels()))?;
+        Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))
+    };
+    read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, images)| {
+        each(view, images)?;
         context.progress.advance(1);
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Linear samples: halves for 8 bits, which are told apart by them, and for halves; floats for the others.

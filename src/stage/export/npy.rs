@@ -4,18 +4,14 @@ use std::io::Write;
 
 use btfkit_formats::npy::{directions_file, header, sample_bytes};
 
-use super::{Options, for_each_view};
+use super::{Options, Written, for_each_view};
 use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::store::measurement::Measurement;
-use crate::store::{mapped, output};
+use crate::store::output;
 
-pub(super) fn write(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Vec<String>> {
+pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = measurement.description();
     let (height, width) = (description.size.height, description.size.width);
     let shape = [description.views.len(), description.lights.len(), height, width, description.n_channels()];
@@ -23,9 +19,9 @@ pub(super) fn write(
     // Beside the array first: when the array is there, so are they.
     for (kind, list) in [("views", &description.views), ("lights", &description.lights)] {
         let beside = options.output.with_extension(format!("{kind}.npy"));
-        mapped::write_file(&beside, &directions_file(list))?;
+        output::write_new(&beside, context.existing, &directions_file(list))?;
     }
-    output::write_whole(&options.output, |output| {
+    let made = output::write_whole(&options.output, context.existing, |output| {
         output.write_all(&header(shape.map(|n| n as u64), description.sample_type)).map_err(failed)?;
         for_each_view(measurement, context, |_, images| {
             output.write_all(&sample_bytes(&images)).map_err(failed)
@@ -38,5 +34,5 @@ pub(super) fn write(
         let curve = if floats { "srgb" } else { "linear" };
         warnings.push(format!("arrays do not hold their transfer curve: import it with --transfer {curve}"));
     }
-    Ok(warnings)
+    Ok((made, warnings))
 }

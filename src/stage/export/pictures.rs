@@ -1,6 +1,6 @@
 //! A picture for each pair of directions: JPEGs in a zip as UBO2003 has them, EXRs or PNGs in a folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use btfkit_formats::jpeg::{self, EncodeOptions};
 use btfkit_formats::picture::{self, Picture};
@@ -9,12 +9,12 @@ use btfkit_formats::zip::ZipWriter;
 use btfkit_formats::{Direction, SampleType, Samples};
 use rayon::prelude::*;
 
-use super::{Options, for_each_view, linear};
+use super::{Options, Written, for_each_view, linear};
 use crate::color::srgb_encode_u8;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::store::measurement::{Description, Measurement};
-use crate::store::{mapped, output};
+use crate::store::output;
 
 /// Format of the pictures in a folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -28,7 +28,7 @@ pub(super) fn ubo2003(
     measurement: &Measurement,
     options: &Options,
     context: &Context<'_>,
-) -> Result<Vec<String>> {
+) -> Result<Written> {
     let description = measurement.description();
     let whole_degrees = |list: &[Direction]| -> Result<Vec<Angles>> {
         list.iter()
@@ -48,7 +48,7 @@ pub(super) fn ubo2003(
     let encoding = EncodeOptions { quality: options.quality, ..EncodeOptions::UBO2003 };
     let channels: u8 = if description.n_channels() == 1 { 1 } else { 3 };
     let (width, height) = (description.size.width as u32, description.size.height as u32);
-    output::write_whole(&options.output, |output| {
+    let made = output::write_whole(&options.output, context.existing, |output| {
         let mut zip = ZipWriter::new(output);
         for_each_view(measurement, context, |view, images| {
             let display = display_codes(&images, description)?;
@@ -69,7 +69,7 @@ pub(super) fn ubo2003(
         zip.finish()?;
         Ok(())
     })?;
-    Ok(Vec::new())
+    Ok((made, Vec::new()))
 }
 
 /// 8-bit sRGB values of samples: grey or R, G, B.
@@ -91,7 +91,7 @@ pub(super) fn folder(
     options: &Options,
     kind: Kind,
     context: &Context<'_>,
-) -> Result<Vec<String>> {
+) -> Result<Written> {
     let description = measurement.description();
     let integers = matches!(description.sample_type, SampleType::U8 | SampleType::U16);
     if kind == Kind::Png && (!integers || !matches!(description.n_channels(), 1 | 3)) {
@@ -102,23 +102,23 @@ pub(super) fn folder(
         ))
         .hint("export to a folder of EXRs instead"));
     }
-    output::write_whole_folder(&options.output, |root| {
+    let made = output::write_whole_folder(&options.output, context.existing, |root| {
         for_each_view(measurement, context, |view, images| {
             let image = images.len() / description.lights.len();
             context.install(|| {
                 description.lights.par_iter().enumerate().try_for_each(|(light, direction)| {
                     let samples = images.select(std::iter::once(light * image..(light + 1) * image));
                     let samples = samples.ok_or_else(|| Error::internal("an image without samples"))?;
-                    let name = name(root, description.views[view], *direction, kind);
-                    write_picture(&name, samples, description, kind)
+                    let name = name(description.views[view], *direction, kind);
+                    root.put(&name, &picture_bytes(samples, description, kind)?)
                 })
             })
         })
     })?;
-    Ok(Vec::new())
+    Ok((made, Vec::new()))
 }
 
-fn write_picture(path: &Path, samples: Samples, description: &Description, kind: Kind) -> Result<()> {
+fn picture_bytes(samples: Samples, description: &Description, kind: Kind) -> Result<Vec<u8>> {
     let samples = if kind == Kind::Exr { linear(&samples, description.transfer) } else { samples };
     let picture = Picture {
         width: description.size.width as u32,
@@ -126,15 +126,14 @@ fn write_picture(path: &Path, samples: Samples, description: &Description, kind:
         channels: description.channels.clone(),
         samples,
     };
-    let bytes = match kind {
+    Ok(match kind {
         Kind::Exr => picture::exr::encode(&picture, picture::exr::Compression::Zip)?,
         Kind::Png => picture::png::encode(&picture)?,
-    };
-    mapped::write_file(path, &bytes)
+    })
 }
 
 /// `tvT_pvP/tvT_pvP_tlT_plP.exr`, degrees to nine decimals without needless zeros.
-fn name(root: &Path, view: Direction, light: Direction, kind: Kind) -> std::path::PathBuf {
+fn name(view: Direction, light: Direction, kind: Kind) -> PathBuf {
     let text = |direction: Direction, side: char| {
         let round = |angle: f64| (angle * 1e9).round() / 1e9;
         let (theta, phi) = direction.degrees();
@@ -142,5 +141,5 @@ fn name(root: &Path, view: Direction, light: Direction, kind: Kind) -> std::path
     };
     let extension = if kind == Kind::Exr { "exr" } else { "png" };
     let (view, light) = (text(view, 'v'), text(light, 'l'));
-    root.join(&view).join(format!("{view}_{light}.{extension}"))
+    Path::new(&view).join(format!("{view}_{light}.{extension}"))
 }

@@ -87,7 +87,7 @@ impl Plan {
 
     /// Fits the field, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
-        let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe)? else {
+        let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe, context)? else {
             return self.model.report(Stage::Fit);
         };
         context.progress.begin("fit", 1, Counted::Items("field"));
@@ -100,7 +100,7 @@ impl Plan {
             context.install(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
         self.model.write_surface(&surface)?;
         let report = FieldReport::new(&surface);
-        self.model.finish(Stage::Fit, &self.recipe, &report)?;
+        self.model.finish(Stage::Fit, &self.recipe, &report, context)?;
         context.progress.advance(1);
         context.progress.end();
         Ok(report)

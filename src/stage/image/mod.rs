@@ -2,16 +2,18 @@
 
 mod scene;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
 use crate::picture::{Encoding, Picture, stream};
-use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
+use crate::store::output::Made;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
@@ -75,7 +77,8 @@ pub struct PlaneOptions {
     pub jitter: Option<u32>,
 }
 
-/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size.
+/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size, and whether
+/// it was there already.
 ///
 /// # Errors
 /// A window that does not lie within the plane, a size that the format or the memory does not hold, and those of
@@ -86,7 +89,7 @@ pub fn run(
     output: &Path,
     encoding: Encoding,
     context: &Context<'_>,
-) -> Result<Size> {
+) -> Result<(Size, Made)> {
     let fits = |size: Size| {
         encoding.check_size(size)?;
         encoding.check_memory(size, WRITING_BYTES, context.memory_bytes)
@@ -97,25 +100,45 @@ pub fn run(
     let size = scene.size();
     fits(size)?;
     let writing = encoding.memory_bytes(size) + WRITING_BYTES;
-    let mut bands = scene.bands(context.memory_bytes.saturating_sub(writing))?;
+    let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
-    let mut band: Option<(usize, usize, Band<'_>)> = None;
-    stream::write(output, encoding, size, scene.meaning(), |pixels| {
-        let (next, rows, read) = match band.take() {
-            Some(band) if band.0 < band.1 => band,
-            _ => {
-                context.check_stop()?;
-                let rows = bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
-                (0, rows.len(), scene.read(rows, context)?)
-            }
-        };
-        read.row(next, pixels);
-        band = Some((next + 1, rows, read));
-        context.progress.advance(1);
-        Ok(())
+    let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
+    let made = read_ahead::with(context, in_flight, bands, read, |bands| {
+        let mut rows = Rows { bands, band: None };
+        stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
+            rows.next(pixels)?;
+            context.progress.advance(1);
+            Ok(())
+        })
     })?;
     context.progress.end();
-    Ok(size)
+    Ok((size, made))
+}
+
+/// The rows of a picture, out of bands.
+struct Rows<'a, 'b> {
+    bands: &'a mut dyn Iterator<Item = Result<(usize, Band<'b>)>>,
+    /// The band, its rows, and which of them comes next.
+    band: Option<(usize, usize, Band<'b>)>,
+}
+
+impl Rows<'_, '_> {
+    /// Gives the next row.
+    fn next(&mut self, pixels: &mut [[f32; 3]]) -> Result<()> {
+        let (next, rows, band) = match self.band.take() {
+            Some(band) if band.0 < band.1 => band,
+            // Dropped first: no more bands are alive than memory was counted for.
+            done => {
+                drop(done);
+                let band = self.bands.next().ok_or_else(|| Error::internal("more rows than there are"))?;
+                let (rows, band) = band?;
+                (0, rows, band)
+            }
+        };
+        band.row(next, pixels);
+        self.band = Some((next + 1, rows, band));
+        Ok(())
+    }
 }
 
 /// The measurement itself, mixed between measured directions.

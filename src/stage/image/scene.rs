@@ -15,7 +15,7 @@ use crate::color::Decoder;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::picture::{Meaning, Picture, false_color};
-use crate::run::Context;
+use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::Store;
@@ -237,17 +237,20 @@ impl Scene {
         Ok(Band { width, pixels })
     }
 
-    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed`
-    /// bytes do not hold more.
+    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed_bytes` do not
+    /// hold more, and how many of them fit at a time.
     ///
     /// # Errors
     /// Where not even a row fits.
-    pub fn bands(&self, allowed_bytes: u64) -> Result<impl Iterator<Item = Range<usize>> + use<>> {
+    pub fn bands_in_flight(
+        &self,
+        allowed_bytes: u64,
+    ) -> Result<(usize, impl Iterator<Item = Range<usize>> + Send + use<>)> {
         let Size { height, width } = self.area.size;
         let row_bytes = (width * self.texel_bytes()) as u64;
-        let fitting = |&rows: &usize| rows as u64 * row_bytes <= allowed_bytes;
-        let rows = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
-        let rows = rows.into_iter().find(fitting).ok_or_else(|| {
+        let sizes = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
+        let fitting = sizes.into_iter().find(|&rows| rows as u64 * row_bytes <= allowed_bytes);
+        let rows = fitting.ok_or_else(|| {
             Error::usage(format!(
                 "a row of {width} pixels takes {} KiB of memory, {} KiB are left for it",
                 row_bytes.div_ceil(1024),
@@ -255,10 +258,12 @@ impl Scene {
             ))
             .hint("allow a larger --memory, or picture a narrower part")
         })?;
+        let in_flight = read_ahead::in_flight(allowed_bytes, rows as u64 * row_bytes);
         // Rows of chunks begin at row 0 of what is stored.
         let before = self.area.y.rem_euclid(rows as i64) as usize;
         let tops = (0..before + height).step_by(rows);
-        Ok(tops.map(move |top| top.saturating_sub(before)..(top + rows - before).min(height)))
+        let bands = tops.map(move |top| top.saturating_sub(before)..(top + rows - before).min(height));
+        Ok((in_flight, bands))
     }
 
     /// Rows that are decoded together.

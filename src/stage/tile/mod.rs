@@ -138,8 +138,8 @@ impl Plan {
 
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
-        let model = Model::create(&self.model)?;
-        let Some(_lock) = model.begin(Stage::Tile, &self.recipe)? else {
+        let model = Model::create(&self.model, context)?;
+        let Some(_lock) = model.begin(Stage::Tile, &self.recipe, context)? else {
             return model.report(Stage::Tile);
         };
         let description = self.measurement.description();
@@ -159,7 +159,7 @@ impl Plan {
         };
         model.write_directions(description)?;
         model.write_tile(&tile)?;
-        model.finish(Stage::Tile, &self.recipe, &report)?;
+        model.finish(Stage::Tile, &self.recipe, &report, context)?;
         Ok(report)
     }
 

@@ -18,10 +18,10 @@ use btfkit_formats::{SampleType, Samples};
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
-use crate::run::recipe;
+use crate::run::{Context, recipe};
 use crate::shape::{Size, Window};
 use crate::store::codec::{Chain, chunk_codecs};
-use crate::store::{Array, Layout, Named, Store};
+use crate::store::{Array, Layout, Lock, Named, Store};
 use crate::views::Views;
 use btfkit_formats::Direction;
 pub use description::Description;
@@ -44,6 +44,8 @@ pub struct Measurement {
     codec: Chain,
     reflectance: Array,
     luminance: Array,
+    /// Of one that is being written.
+    _lock: Option<Lock>,
 }
 
 impl Measurement {
@@ -51,8 +53,14 @@ impl Measurement {
     ///
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
-    pub fn create(path: &Path, description: Description, codec: Chain, origin: &Origin<'_>) -> Result<Self> {
-        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES)
+    pub fn create(
+        path: &Path,
+        description: Description,
+        codec: Chain,
+        origin: &Origin<'_>,
+        context: &Context<'_>,
+    ) -> Result<Self> {
+        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES, context)
     }
 
     fn create_in_shards(
@@ -61,24 +69,27 @@ impl Measurement {
         codec: Chain,
         origin: &Origin<'_>,
         limit_bytes: usize,
+        context: &Context<'_>,
     ) -> Result<Self> {
         let recipe = origin.recipe;
         let store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
-        store.begin_by_recipe(
+        let lock = store.begin_by_recipe(
             KIND,
             recipe,
             json!({
                 "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
                 "assumptions": origin.assumptions, "remarks": origin.remarks,
             }),
+            context,
         )?;
         write_directions(&store, "view_direction", "view", &description.views)?;
         write_directions(&store, "light_direction", "light", &description.lights)?;
         let side = description.shard_side(limit_bytes);
         let reflectance = create_reflectance(&store, &description, codec, side)?;
         let luminance = create_luminance(&store, &description, codec, side)?;
-        Ok(Self { store, description, digest: recipe::digest(recipe), side, codec, reflectance, luminance })
+        let digest = recipe::digest(recipe);
+        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: Some(lock) })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
@@ -145,7 +156,7 @@ impl Measurement {
         if codes != Some(codec) || !side.is_multiple_of(CHUNK_SIDE) {
             return Err(damaged("luminance: other codecs than those of reflectance".to_owned()));
         }
-        Ok(Self { store, description, digest, side, codec, reflectance, luminance })
+        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: None })
     }
 
     /// What it holds.
@@ -373,6 +384,8 @@ mod tests {
             (Size::new(37, 50), 16 * 16 * 15 * 4, 16, SampleType::F32),
         ] {
             let folder = tempfile::tempdir().unwrap();
+            let stop = std::sync::atomic::AtomicBool::new(false);
+            let context = Context::new(&crate::run::progress::Silent, &stop, 1, 1 << 30).unwrap();
             let recipe = json!({"size": size.to_string()});
             let origin = Origin { recipe: &recipe, assumptions: &[], remarks: &[] };
             let description = description(size, sample_type);
@@ -382,6 +395,7 @@ mod tests {
                 Chain::Stock,
                 &origin,
                 limit,
+                &context,
             )
             .unwrap();
             assert_eq!(measurement.side, side);

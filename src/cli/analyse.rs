@@ -273,7 +273,7 @@ impl Cluster {
             Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
             Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
             Stepped::Assigned { pass, found, written } => {
-                tell.line(format!("pass {pass}: {written} parts assigned, {found} were done"));
+                tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
         }
         Ok(())
@@ -365,7 +365,7 @@ fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
     let how = taken.map_or(format!("after {}", counted(report.passes.len(), "pass")), |(name, texels)| {
-        format!("of {name}, where {texels} texels were clustered")
+        format!("of {name}, which clustered {}", counted(*texels, "texel"))
     });
     tell.stage(
         "clusters",
@@ -423,7 +423,10 @@ impl Compare {
                 ]);
             }
             tell.text(&table(&rows));
-            tell.line(format!("CIEDE2000 over {} texels, the other figures over all", report.colour_texels));
+            tell.line(format!(
+                "CIEDE2000 over {}, the other figures over all",
+                counted(report.colour_texels, "texel")
+            ));
         }
         match &self.picture {
             Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),

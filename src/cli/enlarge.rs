@@ -18,9 +18,6 @@ use super::{Tell, bytes_text};
 /// Tiles of a set, unless their number is given.
 const TILES: usize = 4;
 
-/// Nearest normals among which the paper's method chooses, unless their number is given.
-const CANDIDATES: usize = 16;
-
 /// The most outputs that one command makes.
 const MOST_SEEDS: u64 = 1 << 16;
 
@@ -78,7 +75,7 @@ pub(super) struct Enlarge {
     /// Number of tiles that join each other (tiles) [default: 4]
     #[arg(long, value_name = "N")]
     tiles: Option<usize>,
-    /// Number of nearest normals among which one is chosen (paper) [default: 16]
+    /// Number of nearest normals among which one is chosen (paper) [default: 16, or all of a smaller tile]
     #[arg(long)]
     candidates: Option<usize>,
     /// Rows in work at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
@@ -172,7 +169,7 @@ impl Enlarge {
         let pieces = |pieces| By::Patches(patches::Options { pieces, keep_source, keep_normals });
         match self.method {
             Method::Paper => By::Paper(paper::Options {
-                candidates: self.candidates.unwrap_or(CANDIDATES),
+                candidates: self.candidates,
                 keep_normals,
                 band_rows: self.band.map(|rows| rows as usize),
             }),

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::store::mapped::write_file;
+use btfkit::words::counted;
 use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -128,7 +129,7 @@ fn write_pages(whole: &Command, folder: &Path, tell: Tell) -> Result<()> {
     for command in &commands {
         write_file(&folder.join(format!("{}.1", page_name(command))), &rendered(command)?)?;
     }
-    tell.line(format!("{}: {} pages", folder.display(), commands.len()));
+    tell.line(format!("{}: {}", folder.display(), counted(commands.len(), "page")));
     Ok(())
 }
 

@@ -8,6 +8,7 @@ use btfkit::store::codec::Chain;
 use btfkit::store::enlarged::{self, Enlarged};
 use btfkit::store::measurement::{self, Description, Measurement};
 use btfkit::store::model::{self, Model, Stage};
+use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 use serde_json::Value;
@@ -148,8 +149,11 @@ fn model(path: &Path) -> Result<Vec<Vec<String>>> {
     if model.stage(Stage::Cluster)?.is_some() {
         let report: cluster::Report = model.report(Stage::Cluster)?;
         for (number, pass) in report.passes.iter().enumerate() {
-            let found =
-                format!("mean weighted |dL*| {:.4}, {} texels moved", pass.mean_lightness_error, pass.moved);
+            let found = format!(
+                "mean weighted |dL*| {:.4}, {} moved",
+                pass.mean_lightness_error,
+                counted(pass.moved, "texel")
+            );
             rows.push(row![format!("  pass {}", number + 1), found]);
         }
     }

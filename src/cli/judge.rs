@@ -8,6 +8,7 @@ use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
 use btfkit::store::output::write_new;
 use btfkit::text::escaped;
+use btfkit::words::counted;
 use clap::Args;
 
 use super::Tell;
@@ -85,13 +86,13 @@ fn told(report: &Report) -> String {
     };
     let mut lines = vec![
         format!(
-            "{}: {}, {} crops of {} texels",
+            "{}: {}, {} of {} texels a side",
             escaped(&report.subject.display().to_string()),
             Size::new(height, width),
-            report.crops.len(),
+            counted(report.crops.len(), "crop"),
             report.crop
         ),
-        format!("by {} real crops: {origin}", report.real_crops.len()),
+        format!("by {}: {origin}", counted(report.real_crops.len(), "real crop")),
         String::new(),
     ];
     let mut head = vec![String::new()];

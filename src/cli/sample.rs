@@ -5,6 +5,7 @@ use btfkit::run::Context;
 use btfkit::sample::Kind;
 use btfkit::shape::Size;
 use btfkit::stage::sample;
+use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::{Tell, bytes_text, found};
@@ -70,9 +71,9 @@ impl Sample {
             context,
         )?;
         tell.line(format!(
-            "{}: {} images, {}{}",
+            "{}: {}, {}{}",
             self.archive.display(),
-            report.images,
+            counted(report.images, "image"),
             bytes_text(report.bytes),
             found(report.made)
         ));

@@ -105,18 +105,18 @@ impl Verify {
 fn judge(store: &Path, report: &verify::Report) -> Result<()> {
     let store = store.display();
     if !report.damaged.is_empty() {
-        let error = Error::input(format!("{store}: {} damaged chunks", report.damaged.len()));
+        let error = Error::input(format!("{store}: {}", counted(report.damaged.len(), "damaged chunk")));
         return Err(error.hint("delete the files named and import again: only their views are read"));
     }
     match report.different {
         Some(count) if count > 0 => {
-            return Err(Error::input(format!("{store}: {count} samples are not those of the archive")));
+            return Err(Error::input(format!("{store}: {} unlike the archive's", counted(count, "sample"))));
         }
         _ => {}
     }
     if report.views_missing.is_empty() {
         return Ok(());
     }
-    let error = Error::missing(format!("{store}: {} views are missing", report.views_missing.len()));
+    let error = Error::missing(format!("{store}: {} missing", counted(report.views_missing.len(), "view")));
     Err(error.hint("run the command that makes this store again; it goes on where it stopped"))
 }

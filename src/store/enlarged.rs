@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::store::model::Stage;
+use crate::store::model_place;
 use crate::store::{Array, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
@@ -96,7 +97,7 @@ pub struct Texels<'a> {
 impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
     ///
-    /// `model` is the model's place; its name is kept, to find it beside the result.
+    /// `model` is the model's place; its name and the way to it are kept, to find it again.
     pub fn create(
         path: &Path,
         description: &Description,
@@ -107,6 +108,7 @@ impl Enlarged {
         let store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
         let lock = store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}), context)?;
+        model_place::note(path, model)?;
         let Description { size, clusters, .. } = *description;
         let wide = clusters > 256;
         let index = if wide {

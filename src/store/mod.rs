@@ -12,6 +12,7 @@ mod lock;
 pub mod mapped;
 pub mod measurement;
 pub mod model;
+pub(crate) mod model_place;
 pub mod output;
 pub mod passes;
 mod shard;

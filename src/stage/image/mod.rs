@@ -20,7 +20,7 @@ use crate::texel::triangulation::{Interpolator, triangulate};
 use btfkit_formats::Direction;
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
-pub(crate) use scene::{model_of, plane_rows};
+pub(crate) use scene::{model_of, of_stage, plane_rows};
 
 /// Memory for what does not grow with a picture: the program itself, packers, buffers.
 const WRITING_BYTES: u64 = 16 << 20;

@@ -17,6 +17,8 @@ mod coherent;
 mod coherent_damage;
 #[path = "behaviour/coherent_example.rs"]
 mod coherent_example;
+#[path = "behaviour/command_line.rs"]
+mod command_line;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/deepzoom.rs"]
@@ -50,6 +52,8 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/setup.rs"]
+mod setup;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

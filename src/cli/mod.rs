@@ -91,7 +91,7 @@ struct Common {
 enum ProgressStyle {
     /// Bars on a terminal, nothing elsewhere.
     Auto,
-    /// A JSON object a line on standard error, for schedulers.
+    /// A JSON object a line on standard error, for schedulers; errors too.
     Json,
     /// Nothing.
     None,
@@ -145,7 +145,8 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
-    let tell = Tell { quiet: cli.common.quiet, found: false };
+    let tell =
+        Tell { quiet: cli.common.quiet, found: false, json: cli.common.progress == ProgressStyle::Json };
     let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
         .map(|context| {
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
@@ -207,6 +208,8 @@ struct Tell {
     quiet: bool,
     /// What is told was found done.
     found: bool,
+    /// Errors are told as JSON, as progress is.
+    json: bool,
 }
 
 impl Tell {
@@ -256,6 +259,13 @@ impl Tell {
         if let Some(name) = name.filter(|name| !text.starts_with(*name)) {
             text = format!("{name}: {text}");
         }
+        if self.json {
+            let line = serde_json::json!({
+                "event": "error", "exit_code": exit_code(error.kind()), "message": text, "advice": error.guidance(),
+            });
+            let _ = writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string()));
+            return;
+        }
         let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
         let told = format!("btf: {text}{hint}");
         let text = terminal::wrapped(&escaped_lines(&told), terminal::of_errors());
@@ -265,6 +275,10 @@ impl Tell {
     /// The last line of many; beside JSON on standard error.
     fn count(self, beside_json: bool, text: &str) {
         match beside_json {
+            true if self.json && !self.quiet => {
+                let line = serde_json::json!({"event": "count", "text": text});
+                drop(writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string())));
+            }
             true if !self.quiet => drop(writeln!(std::io::stderr(), "btf: {}", escaped(text))),
             _ => self.line(text),
         }

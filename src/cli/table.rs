@@ -73,7 +73,7 @@ pub(super) use row;
 
 #[cfg(test)]
 mod tests {
-    use super::{laid_out, row};
+    use super::laid_out;
 
     #[test]
     fn numbers_stand_flush_right_and_prose_flush_left() {

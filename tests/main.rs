@@ -42,6 +42,9 @@ mod judging;
 mod lattices;
 #[path = "behaviour/many.rs"]
 mod many;
+#[path = "behaviour/option_effects.rs"]
+#[allow(dead_code)] // the program's own tests read the rest
+mod option_effects;
 #[path = "behaviour/paper_bytes.rs"]
 mod paper_bytes;
 #[path = "behaviour/picture_formats.rs"]
@@ -52,6 +55,8 @@ mod pictures;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/safety.rs"]
+mod safety;
 #[path = "behaviour/setup.rs"]
 mod setup;
 #[path = "behaviour/tiles.rs"]

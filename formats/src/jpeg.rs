@@ -10,6 +10,8 @@
 mod decode;
 mod encode;
 mod frame;
+mod huffman;
+mod interleave;
 mod marker;
 mod progress;
 mod structure;
@@ -30,6 +32,9 @@ pub struct Header {
     pub channels: u8,
     /// Progressive, else sequential.
     pub progressive: bool,
+    /// The orientation that Exif data before the frame header ask a viewer for, 1..=8; 1 (as stored) where they
+    /// say nothing. Samples are handed out as stored.
+    pub orientation: u8,
 }
 
 /// Reads the header only: nothing after the frame header is looked at, so an image that is cut later passes.
@@ -48,5 +53,5 @@ pub fn header(bytes: &[u8], limits: &Limits) -> Result<Header> {
 ///
 /// Like [`decode()`], but for errors in entropy-coded data and in tables.
 pub fn check(bytes: &[u8], limits: &Limits) -> Result<Header> {
-    structure::walk(bytes, limits)
+    structure::walk(bytes, limits).map(|walked| walked.header)
 }

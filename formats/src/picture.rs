@@ -17,6 +17,7 @@
 mod alpha;
 pub mod exr;
 mod hdr;
+pub(crate) mod orientation;
 pub mod png;
 mod size;
 mod tiff;
@@ -84,6 +85,11 @@ pub struct PictureHeader {
     pub linear: bool,
     /// A Radiance picture whose resolution line names X first, so that [`HdrOrientation`] matters.
     pub scanlines_are_columns: bool,
+    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF): 1..=8, 1 being as stored
+    /// and what is meant where it says nothing. Samples are handed out as stored.
+    pub orientation: u8,
+    /// The one layer of an OpenEXR picture whose channels are all in it.
+    pub layer: Option<String>,
 }
 
 /// How a Radiance picture is read whose resolution line is `+X n -Y n`.
@@ -202,6 +208,8 @@ fn of_jpeg(header: jpeg::Header) -> PictureHeader {
         sample_type: SampleType::U8,
         linear: false,
         scanlines_are_columns: false,
+        orientation: header.orientation,
+        layer: None,
     }
 }
 

@@ -8,7 +8,7 @@ use btfkit_formats::{Contents, Direction, SampleType, Samples, f16};
 use serde::{Deserialize, Serialize};
 
 use super::{Reading, Source};
-use crate::color::Transfer;
+use crate::color::{LightnessCodes, Remarkable, Transfer};
 use crate::error::{Error, Result};
 use crate::run::Context;
 
@@ -166,6 +166,47 @@ impl Source for Adapted {
     }
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
+        Ok(self.converted(&self.mended(view, lights.clone())?, lights.start))
+    }
+
+    fn read_counted(
+        &self,
+        view: usize,
+        lights: Range<usize>,
+        white: f64,
+    ) -> Result<(Samples, Option<Remarkable>)> {
+        let Contents { linear, channels, sample_type, .. } = &self.contents;
+        let samples = self.mended(view, lights.clone())?;
+        let before = samples.sample_type();
+        if before == *sample_type {
+            return Ok((self.converted(&samples, lights.start), None));
+        }
+        let transfer = if *linear { Transfer::Linear } else { Transfer::Srgb };
+        let codes = LightnessCodes::new(transfer, before, channels, white)?;
+        let as_found = match &self.cosines {
+            Some(_) => self.with_cosines(&samples, before, lights.start),
+            None => samples.clone(),
+        };
+        let found = codes.fill(&as_found, &mut vec![0; as_found.len() / channels.len()]);
+        Ok((self.converted(&samples, lights.start), Some(found)))
+    }
+
+    fn reading(&self) -> Reading {
+        self.reading.clone()
+    }
+
+    fn notes(&self) -> Vec<String> {
+        self.inner.notes()
+    }
+
+    fn check(&self, context: &Context<'_>) -> Result<String> {
+        self.inner.check(context)
+    }
+}
+
+impl Adapted {
+    /// Images in their own type, of the right directions and the right way round.
+    fn mended(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
         let view = *self.kept.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
         let mut samples = if self.swap {
             let mut samples = Samples::none(self.inner.contents().sample_type);
@@ -180,30 +221,26 @@ impl Source for Adapted {
         if self.transpose {
             samples = transposed(&samples, *height as usize, *width as usize, channels.len());
         }
-        let image = *width as usize * *height as usize * channels.len();
-        if let Some(cosines) = &self.cosines {
-            let transfer = if self.contents.linear { Transfer::Linear } else { Transfer::Srgb };
-            let times = |at: usize, value: f64| {
-                let cosine = cosines[lights.start + at / image];
-                transfer.encode(transfer.decode(value) * cosine)
-            };
-            samples = mapped(&samples, self.contents.sample_type, times);
-        } else if samples.sample_type() != self.contents.sample_type {
-            samples = mapped(&samples, self.contents.sample_type, |_, value| value);
-        }
         Ok(samples)
     }
 
-    fn reading(&self) -> Reading {
-        self.reading.clone()
+    /// Images as they are to be stored; the first is that of light `first`.
+    fn converted(&self, samples: &Samples, first: usize) -> Samples {
+        let wanted = self.contents.sample_type;
+        match &self.cosines {
+            Some(_) => self.with_cosines(samples, wanted, first),
+            None if samples.sample_type() == wanted => samples.clone(),
+            None => mapped(samples, wanted, |_, value| value),
+        }
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.inner.notes()
-    }
-
-    fn check(&self, context: &Context<'_>) -> Result<String> {
-        self.inner.check(context)
+    /// The cosine of each light multiplied in, where it is to be.
+    fn with_cosines(&self, samples: &Samples, sample_type: SampleType, first: usize) -> Samples {
+        let Contents { width, height, channels, linear, .. } = &self.contents;
+        let image = *width as usize * *height as usize * channels.len();
+        let transfer = if *linear { Transfer::Linear } else { Transfer::Srgb };
+        let cosine = |at: usize| self.cosines.as_ref().map_or(1.0, |cosines| cosines[first + at / image]);
+        mapped(samples, sample_type, |at, value| transfer.encode(transfer.decode(value) * cosine(at)))
     }
 }
 
@@ -223,15 +260,21 @@ fn transposed(samples: &Samples, height: usize, width: usize, channels: usize) -
 }
 
 /// Samples of a type, each a function of its place and its value on the scale where 1.0 is reflectance 1.
-/// Integers are rounded and clipped.
+/// Integers are rounded and clipped; finite values beyond halves become the largest half.
 fn mapped(samples: &Samples, sample_type: SampleType, of: impl Fn(usize, f64) -> f64) -> Samples {
     let values = (0..samples.len()).map(|at| of(at, samples.value(at).unwrap_or(0.0)));
     match sample_type {
         SampleType::U8 => Samples::U8(values.map(|v| (255.0 * v).round() as u8).collect()),
         SampleType::U16 => Samples::U16(values.map(|v| (65535.0 * v).round() as u16).collect()),
-        SampleType::F16 => Samples::F16(values.map(f16::from_f64).collect()),
+        SampleType::F16 => Samples::F16(values.map(half).collect()),
         SampleType::F32 => Samples::F32(values.map(|v| v as f32).collect()),
     }
+}
+
+/// The nearest half; of finite values never infinity.
+pub(crate) fn half(value: f64) -> f16 {
+    let nearest = f16::from_f64(value);
+    if value.is_finite() && nearest.is_infinite() { f16::MAX.copysign(nearest) } else { nearest }
 }
 
 #[cfg(test)]
@@ -319,6 +362,48 @@ mod tests {
         let found = source.read_images(0, 1..2).unwrap();
         let expected: Vec<f32> = [20, 23, 21, 24, 22, 25].iter().map(|&s| s as f32 / 255.0).collect();
         assert_eq!(found, Samples::F32(expected));
+    }
+
+    #[test]
+    fn what_a_conversion_hides_is_counted_before_it() {
+        /// One image of two texels.
+        struct Floats(Contents, [f32; 2]);
+        impl Source for Floats {
+            fn path(&self) -> &Path {
+                Path::new("floats")
+            }
+            fn contents(&self) -> &Contents {
+                &self.0
+            }
+            fn lights_at_once(&self) -> usize {
+                1
+            }
+            fn read_images(&self, _: usize, _: Range<usize>) -> Result<Samples> {
+                Ok(Samples::F32(self.1.to_vec()))
+            }
+            fn check(&self, _: &Context<'_>) -> Result<String> {
+                Ok(String::new())
+            }
+        }
+        let of = |samples: [f32; 2], wanted: Type| {
+            let contents = Contents {
+                width: 2,
+                height: 1,
+                sample_type: SampleType::F32,
+                ..made(true).contents().clone()
+            };
+            let source: Box<dyn Source> = Box::new(Floats(contents, samples));
+            let source =
+                adapted(source, Adaptation { samples: Some(wanted), ..Adaptation::default() }).unwrap();
+            source.read_counted(0, 0..1, 1.0).unwrap()
+        };
+        let counted = |clipped, not_finite, negative| Some(Remarkable { clipped, not_finite, negative });
+        for wanted in [Type::U8, Type::U16, Type::F16] {
+            assert_eq!(of([3.0, 0.5], wanted).1, counted(1, 0, 0), "{wanted:?}");
+            assert_eq!(of([-0.5, f32::NAN], wanted).1, counted(0, 1, 1), "{wanted:?}");
+        }
+        assert_eq!(of([7e4, -7e4], Type::F16), (Samples::F16(vec![f16::MAX, f16::MIN]), counted(1, 0, 1)));
+        assert_eq!(of([0.5, 0.25], Type::F32).1, None, "nothing is converted");
     }
 
     #[test]

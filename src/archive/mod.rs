@@ -22,6 +22,7 @@ use btfkit_formats::{Contents, Limits, Samples};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::color::Remarkable;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use adapt::Adaptation;
@@ -45,6 +46,17 @@ pub trait Source: Send + Sync {
 
     /// The images of one view under a range of lights, [light, y, x, channel].
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples>;
+
+    /// The same, and what was found in the samples before they were converted to another type, where they were: clipped
+    /// as `white` says, negative, not finite.
+    fn read_counted(
+        &self,
+        view: usize,
+        lights: Range<usize>,
+        _white: f64,
+    ) -> Result<(Samples, Option<Remarkable>)> {
+        Ok((self.read_images(view, lights)?, None))
+    }
 
     /// How the archive is read where more than one way is possible; a part of the recipe of all that is made of it.
     fn reading(&self) -> Reading {

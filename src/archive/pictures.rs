@@ -25,6 +25,8 @@ pub(super) struct Pictures {
     /// Files that are no images.
     ignored: usize,
     contents: Contents,
+    /// What the first picture asks for; no picture is turned.
+    orientation: u8,
     decoding: DecodeOptions,
     limits: Limits,
 }
@@ -49,6 +51,15 @@ impl Pictures {
         if header.scanlines_are_columns {
             assumptions.push(format!("scan lines that are columns: read as {:?}", options.hdr_orientation));
         }
+        if header.orientation != 1 {
+            assumptions.push(format!(
+                "the orientation {} that the pictures ask for is not applied: rows and columns are as stored",
+                header.orientation
+            ));
+        }
+        if let Some(layer) = &header.layer {
+            assumptions.push(format!("the layer {layer:?}, the only one, is the picture"));
+        }
         let contents = Contents {
             format,
             width: header.width,
@@ -63,7 +74,8 @@ impl Pictures {
             remarks: Vec::new(),
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
-        Ok(Self { path, files, images, ignored: catalogue.ignored(), contents, decoding, limits })
+        let (orientation, ignored) = (header.orientation, catalogue.ignored());
+        Ok(Self { path, files, images, ignored, contents, orientation, decoding, limits })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -77,6 +89,15 @@ impl Pictures {
         let found =
             picture::check(&bytes, &self.limits).map_err(|error| error.in_entry(self.files.name(file)))?;
         self.expect_like_first(file, (found.width, found.height, &found.channels, found.sample_type))?;
+        if found.orientation != self.orientation {
+            return Err(Error::input(format!(
+                "{}: asks for the orientation {}, expected {} like the first image; orientations are not applied, \
+                 so take them out of all pictures (exiftool -Orientation= *)",
+                self.files.name(file),
+                found.orientation,
+                self.orientation
+            )));
+        }
         Ok(checksum)
     }
 

@@ -21,18 +21,18 @@ use super::fit::{FitOptions, fit_plan, tell_field};
 use super::outputs::{Naming, Pair};
 use super::table::{row, table};
 use super::tile::{Seed, TileOptions, tell_tile, tile_plan};
-use super::{Tell, bytes_text};
+use super::{Tell, bytes_text, number};
 
 #[derive(Args)]
 struct ClusterOptions {
-    /// Number of clusters, n_c [default: 256]
+    /// Number of clusters, n_c [default: 256, or as many as the tile has texels]
     #[arg(long, group = "amount")]
     clusters: Option<usize>,
     /// Instead: the fewest clusters whose mean weighted |dL*| from their centres is at most this
-    #[arg(long, group = "amount", value_name = "L*")]
+    #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
     error: Option<f64>,
     /// Instead: as many as leave the model this many times smaller than the raw measurement
-    #[arg(long, group = "amount", value_name = "N")]
+    #[arg(long, group = "amount", value_name = "N", value_parser = number::positive)]
     ratio: Option<f64>,
     /// Centre of a cluster
     #[arg(long, value_enum, default_value = "median")]
@@ -41,7 +41,7 @@ struct ClusterOptions {
     #[arg(long, default_value_t = Limits::default().passes)]
     passes: usize,
     /// Least relative gain of the objective that is worth another pass
-    #[arg(long, default_value_t = Limits::default().tolerance)]
+    #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
     tolerance: f64,
     /// Texels to cluster in memory before all others are passed over [default: as many as 192 MiB hold]
     #[arg(long, value_name = "TEXELS")]
@@ -338,7 +338,7 @@ fn cluster_plan(
     let amount = match (options.clusters, options.error, options.ratio) {
         (_, Some(error), _) => Amount::Error(error),
         (_, _, Some(ratio)) => Amount::Ratio(ratio),
-        (clusters, ..) => Amount::Clusters(clusters.unwrap_or(256)),
+        (clusters, ..) => clusters.map_or(Amount::Usual, Amount::Clusters),
     };
     cluster::plan(&cluster::Options {
         measurement: measurement.into(),
@@ -418,7 +418,7 @@ impl Compare {
                     errors.view_theta_deg.map_or("all".to_owned(), |theta| format!("{theta}")),
                     errors.views,
                     format!("{:.3}", errors.lightness),
-                    format!("{:.2}", errors.psnr_db),
+                    errors.psnr_text(),
                     format!("{:.3}", errors.ciede2000)
                 ]);
             }
@@ -427,6 +427,10 @@ impl Compare {
                 "CIEDE2000 over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
+            if report.all.samples_left_out > 0 {
+                let count = counted(report.all.samples_left_out, "sample");
+                tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
+            }
         }
         match &self.picture {
             Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),

@@ -4,6 +4,7 @@ use btfkit::archive::views::ArchiveViews;
 use btfkit::error::{Error, Result};
 use btfkit::picture::Ending;
 use btfkit::run::Context;
+use btfkit::stage::check::finding::MOST_ALARM;
 use btfkit::stage::check::{self, Finding, Report, State, Statistics};
 use btfkit::stage::import;
 use btfkit::store::measurement::Measurement;
@@ -120,7 +121,10 @@ fn tell_report(report: &Report, tell: Tell) {
             State::Finding => "FINDING",
             State::NotChecked => "not checked",
         };
-        let alarm = check.alarm.map_or(String::new(), |alarm| format!("{:.0} %", 100.0 * alarm));
+        let alarm = check.alarm.map_or(String::new(), |alarm| {
+            let more = if alarm >= MOST_ALARM { ">" } else { "" };
+            format!("{more}{:.0} %", 100.0 * alarm)
+        });
         rows.push(row![check.name, state, alarm, check.detail]);
     }
     tell.text(&table(&rows));

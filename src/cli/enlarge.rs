@@ -13,7 +13,7 @@ use clap::{Args, ValueEnum};
 
 use super::each::{Ended, Line, each};
 use super::outputs::{Naming, Pair};
-use super::{Tell, bytes_text};
+use super::{Tell, bytes_text, number};
 
 /// Tiles of a set, unless their number is given.
 const TILES: usize = 4;
@@ -64,7 +64,7 @@ pub(super) struct Enlarge {
     shard: Shard,
     /// How far pieces of the exemplar are moved against each other, from 0 to 1 (coherent): more repeats less, less fits
     /// better [default: 0.5, and 0 where the material has a lattice]
-    #[arg(long, value_parser = jitter)]
+    #[arg(long, value_parser = number::share)]
     jitter: Option<f64>,
     /// Do not write which texel of the tile each texel is (all but paper)
     #[arg(long)]
@@ -227,12 +227,6 @@ fn tell_verdict(verdict: &Verdict, tell: Tell) {
     for warning in &verdict.warnings {
         tell.line(format!("warning   {warning}"));
     }
-}
-
-/// A number from 0 to 1.
-pub(super) fn jitter(text: &str) -> std::result::Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|number| (0.0..=1.0).contains(number));
-    number.ok_or_else(|| format!("expected a number from 0 to 1, got {text:?}"))
 }
 
 /// `7`, or `1..8` for eight seeds.

@@ -11,7 +11,7 @@ use clap::Args;
 
 use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
-use super::{Tell, bytes_text};
+use super::{Tell, bytes_text, number};
 
 /// Archive to measurement: any of the formats that `btf info` knows, one archive or hundreds
 #[derive(Args)]
@@ -34,7 +34,7 @@ pub(super) struct Import {
     #[command(flatten)]
     source: SourceArgs,
     /// Reflectance that counts as L* = 100
-    #[arg(long, default_value_t = 1.0, value_parser = parse_white)]
+    #[arg(long, default_value_t = 1.0, value_parser = number::white)]
     white: f64,
     /// How samples are packed: `stock` opens with zarr-python as it is, `predictive` is smaller and faster
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
@@ -45,11 +45,6 @@ pub(super) struct Import {
     /// Only say what would be done
     #[arg(long)]
     dry_run: bool,
-}
-
-fn parse_white(text: &str) -> std::result::Result<f64, String> {
-    let white: Option<f64> = text.parse().ok().filter(|white: &f64| (1e-3..=1e3).contains(white));
-    white.ok_or_else(|| format!("expected a reflectance from 0.001 to 1000, got {text:?}"))
 }
 
 /// One archive and its store.

@@ -79,7 +79,10 @@ impl Info {
     fn rows(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Vec<Vec<String>>> {
         let path = paths.first().map_or(Path::new(""), PathBuf::as_path);
         let store = path.join("zarr.json").exists();
-        match store.then(|| Store::at(path).attributes()).transpose()?.flatten() {
+        match store
+            .then(|| Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND]))
+            .transpose()?
+        {
             None => self.archive(paths, context),
             Some(attributes) => match attributes.get("kind").and_then(Value::as_str) {
                 Some(measurement::KIND) => measurement(path),
@@ -163,12 +166,11 @@ fn model(path: &Path) -> Result<Vec<Vec<String>>> {
 fn enlarged(path: &Path) -> Result<Vec<Vec<String>>> {
     let enlarged = Enlarged::open(path)?;
     let shards = enlarged.shards();
-    let is_done = |&n: &usize| enlarged.has_shard(n / shards.width, n % shards.width);
-    let done = (0..shards.texels()).filter(is_done).count();
+    let done = enlarged.shards_done();
     Ok(vec![
         row!["kind", enlarged::KIND],
         row!["size", enlarged.size()],
-        row!["method", format!("{:?}", enlarged.method()?).to_lowercase()],
+        row!["method", format!("{:?}", enlarged.method()).to_lowercase()],
         row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
         row!["shards done", format!("{done} of {}", shards.texels())],
     ])

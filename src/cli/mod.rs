@@ -16,6 +16,7 @@ mod image;
 mod import;
 mod info;
 mod judge;
+mod number;
 mod outputs;
 mod progress;
 mod sample;
@@ -33,6 +34,7 @@ use std::sync::atomic::AtomicBool;
 
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
+use btfkit::run::budget::{address_space_left, cannot_start};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::store::output::{Existing, Made};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
@@ -55,6 +57,8 @@ Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input 
 
 /// The version, and the commit that the program was built from.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"), ")");
+/// More threads than any machine has cores that share a memory.
+const MOST_THREADS: i64 = 1024;
 
 /// Turns a measured Bidirectional Texture Function into a small model that covers any surface.
 #[derive(Parser)]
@@ -69,9 +73,9 @@ struct Cli {
 #[derive(Args)]
 #[command(next_help_heading = "Common options")]
 struct Common {
-    /// Threads to use [default: all cores]
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
+    /// Threads to use, from 1 to 1024 [default: all cores]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
+    threads: Option<u32>,
     /// Memory to use, such as 512MiB, 1.5GiB or 2GB
     #[arg(long, global = true, default_value = "2GiB", value_parser = bytes::parse_bytes, value_name = "SIZE")]
     memory: u64,
@@ -125,18 +129,22 @@ enum Command {
 pub(crate) fn run() -> ExitCode {
     let matches = help::command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let threads = cli
-        .common
-        .threads
-        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
-        .max(1);
-    // zarrs decodes chunks on the global pool.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let threads = cli.common.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        |threads| threads as usize,
+    );
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
+    // A failed allocation ends in an abort; what is left lies in temporary files and is swept. With an exit code of ours
+    // schedulers need not take it for a bug that leaves a core.
+    let _ = signal_hook::flag::register_conditional_shutdown(
+        signal_hook::consts::SIGABRT,
+        1,
+        Arc::new(AtomicBool::new(true)),
+    );
     // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
@@ -147,7 +155,12 @@ pub(crate) fn run() -> ExitCode {
     };
     let tell =
         Tell { quiet: cli.common.quiet, found: false, json: cli.common.progress == ProgressStyle::Json };
-    let result = Context::new(progress.as_ref(), &stop, threads, cli.common.memory)
+    let memory = cli.common.memory.min(address_space_left().unwrap_or(u64::MAX));
+    // zarrs decodes chunks on the global pool.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let result = pool
+        .map_err(|error| cannot_start(threads, &error))
+        .and_then(|()| Context::new(progress.as_ref(), &stop, threads, memory))
         .map(|context| {
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
@@ -307,5 +320,53 @@ fn found(made: Made) -> &'static str {
     match made {
         Made::Written => "",
         Made::Found => ", found done",
+    }
+}
+
+#[cfg(test)]
+#[path = "../../tests/behaviour/option_effects.rs"]
+mod option_effects;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::collections::BTreeSet;
+
+    use clap::CommandFactory;
+
+    use super::option_effects::{COMMON, Effect, RECIPES, WITHOUT};
+    use super::*;
+
+    /// An option that is not in the table of effects may be forgotten in a recipe: so it does not pass.
+    #[test]
+    fn of_every_option_it_is_said_whether_the_result_depends_on_it() {
+        let own = |name: &str| {
+            name != "help" && name != "version" && !COMMON.iter().any(|(common, _)| *common == name)
+        };
+        let common: BTreeSet<String> =
+            Cli::command().get_arguments().map(|a| a.get_id().to_string()).collect();
+        for (name, _) in COMMON {
+            assert!(common.contains(*name), "--{name} is no option of all commands");
+        }
+        assert!(
+            common.iter().all(|name| !own(name)),
+            "an option of all commands is not in the table: {common:?}"
+        );
+        for command in Cli::command().get_subcommands() {
+            let name = command.get_name();
+            if WITHOUT.contains(&name) {
+                continue;
+            }
+            let told = RECIPES.iter().find(|of| of.command == name).map(|of| of.options);
+            let told: BTreeSet<&str> = told.unwrap_or_default().iter().map(|(option, _)| *option).collect();
+            let found: BTreeSet<&str> =
+                command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
+            assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");
+        }
+        let reasons = RECIPES.iter().flat_map(|of| of.options).filter_map(|(_, effect)| match effect {
+            Effect::Apart(reason) => Some(*reason),
+            Effect::Changes(arguments) | Effect::Keeps(arguments) => arguments.first().copied(),
+        });
+        assert!(reasons.chain(COMMON.iter().map(|(_, reason)| *reason)).all(|reason| !reason.is_empty()));
     }
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::store::Store;
-use serde_json::Value;
 
 /// An input and the output to make of it.
 pub(super) struct Pair {
@@ -15,7 +14,7 @@ pub(super) struct Pair {
 /// How a command names what it makes.
 pub(super) struct Naming<'a> {
     /// The kind of store that it reads.
-    pub(super) reads: &'a str,
+    pub(super) reads: &'static str,
     /// How names of such stores end; a name with this ending is never an output.
     pub(super) ending: Option<&'a str>,
     /// What the ending of an input is exchanged for.
@@ -47,10 +46,7 @@ impl Naming<'_> {
 
     fn is_input(&self, name: &Path) -> bool {
         let by_ending = self.ending.is_some_and(|ending| file_name(name).ends_with(ending));
-        let kind = |name: &Path| {
-            Store::at(name).attributes().ok()??.get("kind").and_then(Value::as_str).map(str::to_owned)
-        };
-        by_ending || kind(name).as_deref() == Some(self.reads)
+        by_ending || Store::at(name).expect_one_of(&[self.reads]).is_ok()
     }
 
     /// The output of an input: beside it, or in a folder.

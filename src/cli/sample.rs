@@ -8,7 +8,7 @@ use btfkit::stage::sample;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::{Tell, bytes_text, found};
+use super::{Tell, bytes_text, found, number};
 
 /// Make a synthetic measurement in UBO2003's layout
 #[derive(Args)]
@@ -36,7 +36,7 @@ pub(super) struct Sample {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Size of its features relative to the default
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = number::scale)]
     scale: f64,
 }
 

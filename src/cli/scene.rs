@@ -6,7 +6,7 @@ use btfkit::stage::image::{Options, PlaneOptions, Subject, Values};
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
-use super::enlarge::jitter;
+use super::number;
 
 /// What a picture shows.
 #[derive(Args)]
@@ -21,7 +21,7 @@ pub(super) struct SceneArgs {
     #[arg(long, allow_hyphen_values = true)]
     window: Option<Area>,
     /// Factor on the linear values, above 0
-    #[arg(long, default_value_t = 1.0, value_parser = exposure)]
+    #[arg(long, default_value_t = 1.0, value_parser = number::exposure)]
     pub(super) exposure: f64,
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
     #[arg(long, value_enum, default_value = "model")]
@@ -39,7 +39,7 @@ pub(super) struct SceneArgs {
     #[arg(long, requires = "plane", default_value_t = 1)]
     seed: u32,
     /// Jitter of the plane, from 0 to 1, as in `btf enlarge`
-    #[arg(long, requires = "plane", value_parser = jitter)]
+    #[arg(long, requires = "plane", value_parser = number::share)]
     jitter: Option<f64>,
 }
 
@@ -68,9 +68,4 @@ impl SceneArgs {
             window: self.window,
         }
     }
-}
-
-fn exposure(text: &str) -> std::result::Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
-    number.ok_or_else(|| format!("expected a number above 0, got {text:?}"))
 }

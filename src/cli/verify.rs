@@ -1,30 +1,38 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Result};
+use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
-use btfkit::stage::verify;
-use btfkit::store::measurement::Measurement;
+use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::each::{Ended, Line, Outcome, each};
+use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, as_json};
 
-/// Is a measurement whole and undamaged? Names each damaged chunk; --source compares with the archive
+/// Is a store or a pyramid whole and undamaged? Names what is not; --source compares a measurement with its archive
 #[derive(Args)]
 #[command(after_help = "\
+Everything is read: every chunk of every array, what the metadata must say, and what follows from what.
+
 Examples:
   btf verify wood.zarr
   btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
+  btf verify wood.model.zarr
+  btf verify wood-4k.zarr                           with its model, if that lies beside it; else --model names it
+  btf verify wood-4k.dzi                            a Deep Zoom pyramid
   btf verify stores/*.zarr                          a line each, and a count
-Exit code 65 if something is damaged or different, 66 if views are missing.")]
+Exit code 65 if something is damaged or different, 66 if something is missing.")]
 pub(super) struct Verify {
-    /// Measurements; of several each has a line
+    /// Measurements, models, enlarged indices and Deep Zoom pyramids (a .dzi, or the folder of its tiles); of several each
+    /// has a line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
+    /// The model of an enlarged index [default: where it lay when the index was made, or beside it]
+    #[arg(long)]
+    model: Option<PathBuf>,
     /// The archive that it was made of; may be given several times for one in pieces
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
@@ -44,79 +52,137 @@ impl Verify {
             }
             let name = |store: &PathBuf| store.display().to_string();
             return each(&self.stores, name, self.json, context, tell, |store| {
-                self.one_of_many(store, context)
+                let found = self.look(store, context)?;
+                let line =
+                    if self.json { Line::Json(as_json(&found)?) } else { Line::Text(in_short(&found)) };
+                Ok((line, judge(store, &found).err()))
             });
         };
-        let (report, views) = self.report(store, context)?;
+        let found = self.look(store, context)?;
         if self.json {
-            tell.plan(&as_json(&report)?)?;
+            tell.plan(&as_json(&found)?)?;
         } else {
-            tell.text(&self.told(&report, views));
+            tell.text(&told(&found));
         }
-        judge(store, &report).map(|()| Ended::Done)
+        judge(store, &found).map(|()| Ended::Done)
     }
 
-    fn report(&self, store: &Path, context: &Context<'_>) -> Result<(verify::Report, usize)> {
-        let measurement = Measurement::open(store)?;
+    /// Looks at one store or pyramid.
+    fn look(&self, path: &Path, context: &Context<'_>) -> Result<Found> {
         let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
-        let report = verify::run(&measurement, source.as_deref(), context)?;
-        Ok((report, measurement.description().views.len()))
-    }
-
-    fn one_of_many(&self, store: &Path, context: &Context<'_>) -> Result<Outcome> {
-        let (report, views) = self.report(store, context)?;
-        let line = if self.json {
-            Line::Json(as_json(&report)?)
-        } else {
-            Line::Text(format!("whole and undamaged, {}", counted(views, "view")))
-        };
-        Ok((line, judge(store, &report).err()))
-    }
-
-    fn told(&self, report: &verify::Report, views: usize) -> String {
-        let mut rows = vec![
-            row!["views", format!("{} of {views}", report.views_found)],
-            row!["damaged chunks", report.damaged.len()],
-            row!["samples above white", report.samples.clipped],
-            row!["samples not finite", report.samples.not_finite],
-            row!["samples negative", report.samples.negative],
-        ];
-        if let Some(different) = report.different {
-            rows.push(row!["samples unlike the archive's", different]);
-        }
-        let mut text = table(&rows);
-        for damage in &report.damaged {
-            let [y, x] = damage.texel;
-            text.push_str(&format!(
-                "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
-                damage.array,
-                damage.view,
-                escaped(&damage.file),
-                escaped(&damage.what)
-            ));
-        }
-        for (view, light) in &report.different_images {
-            text.push_str(&format!("\ndifferent: view {view}, light {light}"));
-        }
-        text
+        verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
     }
 }
 
-fn judge(store: &Path, report: &verify::Report) -> Result<()> {
-    let store = store.display();
-    if !report.damaged.is_empty() {
-        let error = Error::input(format!("{store}: {}", counted(report.damaged.len(), "damaged chunk")));
-        return Err(error.hint("delete the files named and import again: only their views are read"));
-    }
-    match report.different {
-        Some(count) if count > 0 => {
-            return Err(Error::input(format!("{store}: {} unlike the archive's", counted(count, "sample"))));
+/// What was found of one of many that nothing is wrong with.
+fn in_short(found: &Found) -> String {
+    let (kind, notes) = match found {
+        Found::Measurement { report, .. } => ("measurement", &report.notes),
+        Found::Other(report) => (report.kind, &report.notes),
+    };
+    let notes: String = notes.iter().map(|note| format!("; note: {note}")).collect();
+    format!("{kind}, whole and undamaged{notes}")
+}
+
+/// What was found, for people.
+fn told(found: &Found) -> String {
+    let (mut text, findings, notes) = match found {
+        Found::Measurement { views, report } => {
+            (of_measurement(report, *views), &report.findings, &report.notes)
         }
-        _ => {}
+        Found::Other(report) => {
+            let mut rows = vec![row!["kind", report.kind]];
+            rows.extend(report.checked.iter().map(|(name, what)| row![name, what]));
+            (table(&rows), &report.findings, &report.notes)
+        }
+    };
+    for Finding { part, what, todo, missing } in findings {
+        let word = if *missing { "missing" } else { "damaged" };
+        text.push_str(&format!("\n{word}: {}: {}", escaped(part), escaped(what)));
+        if let Some(todo) = todo {
+            text.push_str(&format!("\n  {}", escaped(todo)));
+        }
     }
-    if report.views_missing.is_empty() {
-        return Ok(());
+    for note in notes {
+        text.push_str(&format!("\nnote: {}", escaped(note)));
     }
-    let error = Error::missing(format!("{store}: {} missing", counted(report.views_missing.len(), "view")));
-    Err(error.hint("run the command that makes this store again; it goes on where it stopped"))
+    if judge(Path::new(""), found).is_ok() {
+        text.push_str("\nwhole and undamaged");
+    }
+    text
+}
+
+fn of_measurement(report: &measurement::Report, views: usize) -> String {
+    let mut rows = vec![
+        row!["kind", "measurement"],
+        row!["views", format!("{} of {views}", report.views_found)],
+        row!["damaged chunks", report.damaged.len()],
+        row!["samples above white", report.samples.clipped],
+        row!["samples not finite", report.samples.not_finite],
+        row!["samples negative", report.samples.negative],
+    ];
+    if let Some(different) = report.different {
+        rows.push(row!["samples unlike the archive's", different]);
+    }
+    let mut text = table(&rows);
+    for damage in &report.damaged {
+        let [y, x] = damage.texel;
+        text.push_str(&format!(
+            "\ndamaged: {} of view {}, chunk at row {y}, column {x}, in {}: {}",
+            damage.array,
+            damage.view,
+            escaped(&damage.file),
+            escaped(&damage.what)
+        ));
+    }
+    for (view, light) in &report.different_images {
+        text.push_str(&format!("\ndifferent: view {view}, light {light}"));
+    }
+    text
+}
+
+/// The error that a report amounts to, if it does.
+fn judge(store: &Path, found: &Found) -> Result<()> {
+    let store = store.display();
+    let findings = match found {
+        Found::Measurement { report, .. } => {
+            if !report.damaged.is_empty() {
+                let error =
+                    Error::input(format!("{store}: {}", counted(report.damaged.len(), "damaged chunk")));
+                let advice = "delete the files named and import again, if you have the archive: only their views are read";
+                return Err(error.hint(advice));
+            }
+            match report.different {
+                Some(count) if count > 0 => {
+                    let what = format!("{store}: {} unlike the archive's", counted(count, "sample"));
+                    return Err(Error::input(what));
+                }
+                _ => {}
+            }
+            if !report.views_missing.is_empty() {
+                let error = Error::missing(format!(
+                    "{store}: {} missing",
+                    counted(report.views_missing.len(), "view")
+                ));
+                return Err(
+                    error.hint("run the command that makes this store again; it goes on where it stopped")
+                );
+            }
+            &report.findings
+        }
+        Found::Other(report) => &report.findings,
+    };
+    let damaged = findings.iter().find(|finding| !finding.missing);
+    let Some(first) = damaged.or(findings.first()) else { return Ok(()) };
+    let kind = if damaged.is_some() { Kind::Input } else { Kind::Missing };
+    let more = match findings.len() {
+        1 => String::new(),
+        count => format!(" (and {} more)", count - 1),
+    };
+    let word = if damaged.is_some() { "damaged" } else { "not whole" };
+    let error = Error::new(kind, format!("{store}: {word}: {}: {}{more}", first.part, first.what));
+    Err(match &first.todo {
+        Some(todo) => error.hint(todo.clone()),
+        None => error,
+    })
 }

@@ -10,6 +10,9 @@ use super::field::Boundary;
 use super::stability::{self, STABLE_RADIUS};
 use crate::error::{Error, Result};
 
+/// How far a covariance may be from its transpose, relative to its largest entry.
+const SYMMETRY_TOLERANCE: f64 = 1e-9;
+
 /// How far T T^T may be from the identity, in any entry.
 const ORTHONORMAL_TOLERANCE: f64 = 1e-6;
 
@@ -121,6 +124,7 @@ impl Model {
         if self.covariance.shape() != (channels, channels) {
             return Err(Error::input(format!("a field model of {channels} channels has another covariance")));
         }
+        check_covariance(&self.covariance).map_err(|error| error.context("covariance"))?;
         match (self.kind, &self.transform) {
             (Kind::Car3d, None) => {}
             (Kind::Car2d, Some(t)) if t.shape() == (channels, channels) => {
@@ -145,6 +149,15 @@ impl Model {
         }
         Ok(())
     }
+}
+
+/// Checks that a matrix is symmetric, but for rounding, and positive definite.
+fn check_covariance(matrix: &DMatrix<f64>) -> Result<()> {
+    let off = (matrix - matrix.transpose()).amax();
+    if off > SYMMETRY_TOLERANCE * matrix.amax() {
+        return Err(Error::input("a covariance matrix is not symmetric"));
+    }
+    cholesky(matrix.clone()).map(drop)
 }
 
 impl Level {
@@ -190,10 +203,15 @@ impl Level {
                 return Err(Error::input(format!("{name} is not finite")));
             }
         }
+        let mut seen = self.neighbourhood.clone();
+        seen.sort_unstable();
+        if let Some(pair) = seen.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::input(format!("neighbour {:?} is there twice", pair[0])));
+        }
         if !(self.gain.is_finite() && self.gain > 0.0) {
             return Err(Error::input(format!("the gain is {}, expected a finite number above 0", self.gain)));
         }
-        cholesky(self.joint(kind).1).map_err(|error| error.context("sigma"))?;
+        check_covariance(&self.joint(kind).1).map_err(|error| error.context("sigma"))?;
         let radius = self.measure_radius(kind)?;
         if radius < STABLE_RADIUS {
             return Ok(());

@@ -1,6 +1,7 @@
 //! What makes long work survive: units that are done or not, recipes that tell results apart,
 //! progress, and stopping on request.
 
+pub mod budget;
 pub mod progress;
 pub mod read_ahead;
 pub mod recipe;
@@ -8,7 +9,7 @@ pub mod units;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Result};
 use crate::store::output::Existing;
 use progress::Progress;
 
@@ -39,7 +40,7 @@ impl<'a> Context<'a> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .map_err(|error| Error::internal(format!("cannot start {threads} threads: {error}")))?;
+            .map_err(|error| budget::cannot_start(threads, &error))?;
         Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
     }
 
@@ -52,6 +53,19 @@ impl<'a> Context<'a> {
     /// An error of kind `Stopped` once a stop has been asked for.
     pub fn check_stop(&self) -> Result<()> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
+    }
+
+    /// Checks that a stage gets the memory that it cannot do without, beside that of the program itself.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Usage`], with what it needs.
+    pub fn require(&self, what: &str, bytes: u64) -> Result<()> {
+        budget::require(what, bytes.saturating_add(budget::OWN_BYTES), self.memory_bytes)
+    }
+
+    /// Memory for the work itself.
+    pub fn work_bytes(&self) -> u64 {
+        self.memory_bytes.saturating_sub(budget::OWN_BYTES)
     }
 
     /// Runs `work` on the pool.
@@ -70,8 +84,5 @@ fn spawn<'scope>(
     work: impl FnOnce() + Send + 'scope,
 ) -> Result<()> {
     let started = std::thread::Builder::new().name(name.to_owned()).spawn_scoped(scope, work);
-    started.map(|_| ()).map_err(|error| {
-        Error::new(Kind::Io, format!("cannot start the thread \"{name}\": {error}"))
-            .hint("allow more processes or memory, or fewer --threads")
-    })
+    started.map(|_| ()).map_err(|error| budget::cannot_start(1, &error))
 }

@@ -8,7 +8,7 @@ use crate::run::{Context, spawn};
 
 /// Units that may be in flight: one a thread, fewer where memory does not allow it, at least one.
 pub fn in_flight(context: &Context<'_>, unit_bytes: u64) -> usize {
-    let affordable = context.memory_bytes / unit_bytes.max(1);
+    let affordable = context.work_bytes() / unit_bytes.max(1);
     (context.threads.max(1) as u64).min(affordable).max(1) as usize
 }
 
@@ -37,11 +37,16 @@ pub fn for_each<U: Sync, T: Send>(
             results.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, result));
         }
     };
-    std::thread::scope(|scope| {
-        let mut workers = 0..in_flight.clamp(1, units.len().max(1));
-        let started = workers.try_for_each(|_| spawn(scope, "unit", worker));
-        failed.fetch_or(started.is_err(), Ordering::Relaxed);
-        started
+    std::thread::scope(|scope| -> Result<()> {
+        for number in 0..in_flight.clamp(1, units.len().max(1)) {
+            match spawn(scope, "unit", worker) {
+                // Fewer do as well, if there is one.
+                Err(error) if number == 0 => return Err(error),
+                Err(_) => break,
+                Ok(()) => {}
+            }
+        }
+        Ok(())
     })?;
     let mut results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     results.sort_by_key(|(number, _)| *number);

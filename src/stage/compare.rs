@@ -44,10 +44,37 @@ pub struct Errors {
     pub views: usize,
     /// Mean |dL*|.
     pub lightness: f64,
-    /// Peak signal to noise ratio of the stored samples, dB (infinite where they are equal).
-    pub psnr_db: f64,
+    /// Peak signal to noise ratio of the stored samples that are finite in both, dB; none unless they differ.
+    pub psnr_db: Option<f64>,
+    /// What there is to say of these samples.
+    pub samples: Agreement,
+    /// Samples that are no finite number in one or the other, which the ratio leaves out.
+    pub samples_left_out: u64,
     /// Mean CIEDE2000.
     pub ciede2000: f64,
+}
+
+impl Errors {
+    /// The ratio for people.
+    pub fn psnr_text(&self) -> String {
+        match (self.samples, self.psnr_db) {
+            (Agreement::Different, Some(psnr)) => format!("{psnr:.2}"),
+            (Agreement::Undefined, _) => "undefined".to_owned(),
+            _ => "equal".to_owned(),
+        }
+    }
+}
+
+/// Whether samples agree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Agreement {
+    /// They differ.
+    Different,
+    /// They are equal, all of them.
+    Equal,
+    /// There is none to compare.
+    Undefined,
 }
 
 #[derive(Clone, Copy, Default)]
@@ -57,6 +84,7 @@ struct Sums {
     code_count: u64,
     squares: f64,
     sample_count: u64,
+    left_out: u64,
     colour: f64,
     colour_count: u64,
 }
@@ -69,18 +97,26 @@ impl Sums {
             code_count: self.code_count + other.code_count,
             squares: self.squares + other.squares,
             sample_count: self.sample_count + other.sample_count,
+            left_out: self.left_out + other.left_out,
             colour: self.colour + other.colour,
             colour_count: self.colour_count + other.colour_count,
         }
     }
 
     fn errors(self, view_theta_deg: Option<f64>) -> Errors {
-        let mean_square = self.squares / self.sample_count.max(1) as f64;
+        let samples = match (self.sample_count, self.squares) {
+            (0, _) => Agreement::Undefined,
+            (_, 0.0) => Agreement::Equal,
+            _ => Agreement::Different,
+        };
+        let psnr = || -10.0 * (self.squares / self.sample_count as f64).log10();
         Errors {
             view_theta_deg,
             views: self.views,
             lightness: self.codes as f64 / self.code_count.max(1) as f64 / 2.55,
-            psnr_db: -10.0 * mean_square.log10(),
+            psnr_db: (samples == Agreement::Different).then(psnr),
+            samples,
+            samples_left_out: self.left_out,
             ciede2000: self.colour / self.colour_count.max(1) as f64,
         }
     }
@@ -108,7 +144,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
         let mut sums = Sums { views: 1, ..Sums::default() };
         let difference = |measured: usize, modelled: usize| {
             let [a, b] = [window.value(measured), representatives.samples.value(modelled)];
-            a.unwrap_or(0.0) - b.unwrap_or(0.0)
+            Some(a? - b?).filter(|difference| difference.is_finite())
         };
         for (number, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
             let start = (usize::from(cluster) * description.views.len() + view) * texel;
@@ -116,8 +152,15 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                 let (measured, modelled) = (at * texel + sample, start + sample);
                 let code = codes.code(&window, measured);
                 sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
-                sums.squares +=
-                    (0..channels).map(|c| difference(measured + c, modelled + c).powi(2)).sum::<f64>();
+                for channel in 0..channels {
+                    match difference(measured + channel, modelled + channel) {
+                        Some(difference) => {
+                            sums.squares += difference * difference;
+                            sums.sample_count += 1;
+                        }
+                        None => sums.left_out += 1,
+                    }
+                }
                 if number % stride == 0 {
                     let [a, b] =
                         [decoder.rgb(&window, measured), decoder.rgb(&representatives.samples, modelled)];
@@ -126,7 +169,6 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                 }
             }
             sums.code_count += description.lights.len() as u64;
-            sums.sample_count += texel as u64;
         }
         context.progress.advance(1);
         Ok(sums)

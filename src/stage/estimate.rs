@@ -17,7 +17,8 @@ const CHUNKS: usize = 16;
 pub fn store_bytes(source: &dyn Source, codec: Chain, context: &Context<'_>) -> Result<u64> {
     let description = import::describe(source, 1.0);
     let view = description.views.len() / 2;
-    let images = context.install(|| import::read_view(source, view, context))?;
+    let images =
+        context.install(|| import::read_view(source, view, 1.0, context).map(|(images, _)| images))?;
     let images = Images::new(description.size, description.n_channels(), description.sample_type, images)?;
     let codes = description.codes()?;
     let side = description.chunk_side();

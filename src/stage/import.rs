@@ -183,12 +183,13 @@ impl Plan<'_> {
         let channels = self.description.n_channels();
         let results = units::for_each(context, &missing, in_flight, |&view| {
             // A broken image does not keep the others from being looked at: all are named at the end.
-            match context.install(|| read_view(self.source, view, context)) {
+            match context.install(|| read_view(self.source, view, self.options.white, context)) {
                 Err(error) if error.kind() == Kind::Input => Ok(Err(error.to_string())),
                 Err(error) => Err(error),
-                Ok(images) => context.install(|| {
+                Ok((images, before)) => context.install(|| {
                     let images = Images::new(size, channels, sample_type, images)?;
-                    measurement.write_view(view, &images, &codes).map(Ok)
+                    let stored = measurement.write_view(view, &images, &codes)?;
+                    Ok(Ok(before.unwrap_or(stored)))
                 }),
             }
         })?;
@@ -205,6 +206,7 @@ impl Plan<'_> {
             return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));
         }
+        measurement.finish(context)?;
         Ok(Report { views_found: found.len(), views_written: missing.len(), samples })
     }
 }
@@ -212,11 +214,17 @@ impl Plan<'_> {
 /// Groups of images of a view: lights, and their samples [light, y, x, channel].
 pub(crate) type Groups = Vec<(std::ops::Range<usize>, Samples)>;
 
-/// The images of a view, read on the threads of the pool that this is called in.
+/// The images of a view, read on the threads of the pool that this is called in; and what was found in them before they
+/// were converted, where they were.
 ///
 /// # Errors
 /// Names every unusable image of the view.
-pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>) -> Result<Groups> {
+pub(crate) fn read_view(
+    source: &dyn Source,
+    view: usize,
+    white: f64,
+    context: &Context<'_>,
+) -> Result<(Groups, Option<Remarkable>)> {
     let lights = source.contents().lights.len();
     let step = source.lights_at_once().clamp(1, lights);
     let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
@@ -224,7 +232,7 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
         .into_par_iter()
         .map(|group| {
             context.check_stop()?;
-            let samples = source.read_images(view, group.clone());
+            let samples = source.read_counted(view, group.clone(), white);
             context.progress.advance(group.len() as u64);
             samples.map(|samples| (group, samples))
         })
@@ -232,15 +240,21 @@ pub(crate) fn read_view(source: &dyn Source, view: usize, context: &Context<'_>)
     context.check_stop()?;
     let mut problems = Vec::new();
     let mut images = Vec::new();
+    let mut before: Option<Remarkable> = None;
     for group in read {
         match group {
-            Ok(group) => images.push(group),
+            Ok((group, (samples, found))) => {
+                images.push((group, samples));
+                if let Some(found) = found {
+                    *before.get_or_insert_default() += found;
+                }
+            }
             Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
     }
     if problems.is_empty() {
-        Ok(images)
+        Ok((images, before))
     } else {
         Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
     }

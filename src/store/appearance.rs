@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
 
-use crate::coherent::{Appearance, Basis, FEATURES, INPUTS, dims_of};
+use crate::coherent::{Appearance, Basis, FEATURES, INPUTS, LEVELS_MOST, dims_of};
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, WaveCounts};
 use crate::shape::{Size, Window};
@@ -70,47 +70,93 @@ impl AppearanceReport {
     }
 }
 
-/// Names of the arrays of some levels.
-pub(super) fn arrays(levels: usize) -> Vec<String> {
-    let of_level = |level: usize| ["basis", "offset"].map(|name| format!("appearance/level_{level}/{name}"));
-    std::iter::once("appearance/features".to_owned()).chain((0..levels).flat_map(of_level)).collect()
+/// The arrays of an appearance of so many clusters.
+pub(super) fn arrays(report: &AppearanceReport, clusters: usize) -> Vec<(String, Layout<'static>)> {
+    let levels = report.levels.len();
+    let of_level = |level: usize| {
+        let dims = dims_of(level, levels);
+        [(basis_name(level), basis_layout(dims)), (offset_name(level), offset_layout(dims))]
+    };
+    let features = ("appearance/features".to_owned(), features_layout(clusters));
+    std::iter::once(features).chain((0..levels).flat_map(of_level)).collect()
+}
+
+fn basis_name(level: usize) -> String {
+    format!("appearance/level_{level}/basis")
+}
+
+fn offset_name(level: usize) -> String {
+    format!("appearance/level_{level}/offset")
+}
+
+fn features_layout(clusters: usize) -> Layout<'static> {
+    Layout::small::<i8>(&["cluster", "feature"], &[clusters, FEATURES])
+}
+
+fn basis_layout(dims: usize) -> Layout<'static> {
+    Layout::small::<i16>(&["input", "dim"], &[INPUTS, dims])
+}
+
+fn offset_layout(dims: usize) -> Layout<'static> {
+    Layout::small::<i32>(&["dim"], &[dims])
 }
 
 pub(super) fn write(store: &Store, appearance: &Appearance) -> Result<()> {
     store.write_group("appearance", Map::new())?;
-    let layout = Layout::small::<i8>(&["cluster", "feature"], &[appearance.features.len(), FEATURES]);
+    let layout = features_layout(appearance.features.len());
     store.write("appearance/features", &layout, appearance.features.as_flattened())?;
     for (number, basis) in appearance.levels.iter().enumerate() {
-        let group = format!("appearance/level_{number}");
-        store.write_group(&group, Map::new())?;
-        let layout = Layout::small::<i16>(&["input", "dim"], &[INPUTS, basis.dims]);
-        store.write(&format!("{group}/basis"), &layout, &basis.weights)?;
-        let layout = Layout::small::<i32>(&["dim"], &[basis.dims]);
-        store.write(&format!("{group}/offset"), &layout, &basis.offset)?;
+        store.write_group(&format!("appearance/level_{number}"), Map::new())?;
+        store.write(&basis_name(number), &basis_layout(basis.dims), &basis.weights)?;
+        store.write(&offset_name(number), &offset_layout(basis.dims), &basis.offset)?;
     }
     Ok(())
 }
 
-/// Reads the appearance of a model of so many clusters.
+/// Reads the appearance of a model of so many clusters, whose tile wraps or does not.
 pub(super) fn read(
     store: &Store,
     report: &AppearanceReport,
     tile: Size,
+    wraps: bool,
     clusters: usize,
 ) -> Result<Appearance> {
+    let refused = |what: String| {
+        Error::input(format!("{}: appearance: {what}", store.path().display()))
+            .hint("run `btf appearance` on it again")
+    };
+    if report.levels.len() > LEVELS_MOST {
+        return Err(refused(format!("got {} levels, expected at most {LEVELS_MOST}", report.levels.len())));
+    }
+    for (number, level) in report.levels.iter().enumerate() {
+        let expected = (1 << number, dims_of(number, report.levels.len()));
+        if (level.spacing, level.dims) != expected {
+            let (spacing, dims) = (level.spacing, level.dims);
+            return Err(refused(format!(
+                "level {number}: got a spacing of {spacing} and {dims} dimensions, expected {} and {}",
+                expected.0, expected.1
+            )));
+        }
+    }
     let [y, x, height, width] = report.exemplar;
-    let (_, features) = store.read::<i8>("appearance/features", &[clusters, FEATURES])?;
+    let exemplar = Window { y, x, size: Size::new(height, width) };
+    if report.wraps != wraps || (wraps && exemplar != tile.window()) {
+        return Err(refused(format!(
+            "got the exemplar {exemplar}, wraps {}, of a tile of {tile} with wraps {wraps}",
+            report.wraps
+        )));
+    }
+    let features = store.read_array::<i8>("appearance/features", &features_layout(clusters))?;
     let (features, _) = features.as_chunks::<FEATURES>();
     let level = |(number, level): (usize, &LevelReport)| {
         let dims = dims_of(number, report.levels.len());
-        let group = format!("appearance/level_{number}");
-        let (_, weights) = store.read::<i16>(&format!("{group}/basis"), &[INPUTS, dims])?;
-        let (_, offset) = store.read::<i32>(&format!("{group}/offset"), &[dims])?;
+        let weights = store.read_array::<i16>(&basis_name(number), &basis_layout(dims))?;
+        let offset = store.read_array::<i32>(&offset_name(number), &offset_layout(dims))?;
         let LevelReport { shift, passes, repetition, .. } = *level;
         Ok(Basis { dims, weights, offset, shift, passes, repetition })
     };
     let appearance = Appearance {
-        exemplar: Window { y, x, size: Size::new(height, width) },
+        exemplar,
         wraps: report.wraps,
         features: features.to_vec(),
         levels: report.levels.iter().enumerate().map(level).collect::<Result<_>>()?,

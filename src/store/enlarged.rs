@@ -1,7 +1,7 @@
 //! The enlarged index store: the cluster of every texel, I_S [y, x], in square shards; beside it, where the method
 //! knows it, the tile's texel that each texel is, and normals on request.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -10,9 +10,11 @@ use serde_json::{Map, Value, json};
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::shape::{Size, Window};
-use crate::store::model::Stage;
+use crate::store::checksums::DIGITS;
+use crate::store::metadata::OLDEST_FORMAT;
+use crate::store::model::{NARROW, Stage, is_unit};
 use crate::store::model_place;
-use crate::store::{Array, Layout, Lock, Named, Store};
+use crate::store::{Array, DAMAGED, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
@@ -23,11 +25,14 @@ pub const SHARD_SIDE: usize = 512;
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
 
-/// Chunks of a shard.
-const SHARD_CHUNKS: usize = (SHARD_SIDE / CHUNK_SIDE).pow(2);
-
 /// Longest side of an index, as of every [`Size`] that is given as text.
-const MOST_SIDE: u64 = 1 << 24;
+const MOST_SIDE: usize = 1 << 24;
+
+/// Most clusters: the index is u16.
+const MOST_CLUSTERS: usize = 1 << 16;
+
+/// The attribute of a finished index that holds the checksums of its shards.
+const CHECKSUMS: &str = "checksums";
 
 /// How an index was enlarged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,14 +64,61 @@ impl Method {
     }
 }
 
+/// The recipe of an enlarged index, as it is stored.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    stage: String,
+    /// Version of the method.
+    pub method: u64,
+    /// Digest of the stages of the model.
+    pub model: String,
+    /// Rows and columns.
+    pub size: [usize; 2],
+    /// Seed of all that was drawn at random.
+    pub seed: u64,
+    /// Whether it joins at its borders.
+    pub tileable: bool,
+    /// By what it was enlarged.
+    #[serde(default)]
+    pub rule: Method,
+    /// Whether the source of each texel is kept.
+    #[serde(default)]
+    pub source: bool,
+    /// Whether normals are kept.
+    #[serde(default)]
+    pub keep_normals: bool,
+    /// Nearest normals that were candidates, by the paper's method.
+    pub candidates: Option<usize>,
+    /// Jitter of the coherent rule.
+    pub jitter: Option<u32>,
+    /// Number of tiles, by the method that lays them.
+    pub tiles: Option<usize>,
+}
+
+/// Attributes, as far as they are needed; the seal covers them all.
+#[derive(Deserialize)]
+struct Facts {
+    recipe: Recipe,
+    version: String,
+    #[serde(default)]
+    model_name: Option<String>,
+    /// Number of clusters of the model; not in the oldest layout.
+    clusters: Option<usize>,
+    /// Rows and columns of the tile; not in the oldest layout.
+    tile: Option<[usize; 2]>,
+}
+
 /// An enlarged index store.
 pub struct Enlarged {
     store: Store,
+    facts: Facts,
     size: Size,
     wide: bool,
     index: Array,
     source: Option<Array>,
     normals: Option<Array>,
+    /// Of one that is being written.
     _lock: Option<Lock>,
 }
 
@@ -77,8 +129,10 @@ pub struct Description {
     pub size: Size,
     /// Number of clusters that it refers to.
     pub clusters: usize,
-    /// Size of the tile, where the source of each texel is kept.
-    pub source: Option<Size>,
+    /// Size of the tile.
+    pub tile: Size,
+    /// Whether the source of each texel is kept.
+    pub keep_source: bool,
     /// Whether normals are kept.
     pub keep_normals: bool,
 }
@@ -105,64 +159,119 @@ impl Enlarged {
         model: &Path,
         context: &Context<'_>,
     ) -> Result<Self> {
-        let store = Store::at(path);
+        let mut store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
-        let lock = store.begin_by_recipe(KIND, recipe, json!({"model_name": model_name}), context)?;
+        let Description { size, clusters, tile, keep_source, keep_normals } = *description;
+        let more = json!({
+            "model_name": model_name, "clusters": clusters, "tile": [tile.height, tile.width],
+        });
+        let lock = store.begin_by_recipe(KIND, recipe, more, context)?;
         model_place::note(path, model)?;
-        let Description { size, clusters, .. } = *description;
-        let wide = clusters > 256;
-        let index = if wide {
-            create::<u16>(&store, "index", size, Map::new())
-        } else {
-            create::<u8>(&store, "index", size, Map::new())
-        }?;
-        let of_tile = |tile: Size| {
-            let mut attributes = Map::new();
-            attributes.insert("meaning".to_owned(), json!("row * width + column of the tile's texel"));
-            attributes.insert("tile".to_owned(), json!([tile.height, tile.width]));
-            create::<u32>(&store, "source", size, attributes)
-        };
-        let source = description.source.map(of_tile).transpose()?;
-        let normals = description.keep_normals.then(|| create_normals(&store, size)).transpose()?;
-        Ok(Self { store, size, wide, index, source, normals, _lock: Some(lock) })
+        let facts = Facts::read(&store)?;
+        let index = store.create_array("index", &index_layout(size, clusters > NARROW))?;
+        let source =
+            keep_source.then(|| store.create_array("source", &source_layout(size, tile))).transpose()?;
+        let normals =
+            keep_normals.then(|| store.create_array("normals", &normals_layout(size))).transpose()?;
+        let wide = clusters > NARROW;
+        Ok(Self { store, facts, size, wide, index, source, normals, _lock: Some(lock) })
     }
 
     /// Opens an enlarged index for reading.
+    ///
+    /// # Errors
+    /// Where attributes or metadata are not those of an enlarged index, or do not fit together.
     pub fn open(path: &Path) -> Result<Self> {
-        let store = Store::at(path);
-        let attributes = store.expect(KIND)?;
-        let index = store.open_array("index")?;
-        let (&[height, width], true) =
-            (index.shape(), index.shape().iter().all(|n| (1..=MOST_SIDE).contains(n)))
-        else {
-            return Err(Error::input(format!(
-                "{}: index: got shape {:?}, expected [y, x], each from 1 to {MOST_SIDE}",
-                path.display(),
-                index.shape()
-            )));
+        let (store, _) = Store::open(path, KIND)?;
+        let mut facts = Facts::read(&store)?;
+        let recipe = &facts.recipe;
+        let size = Size::new(recipe.size[0], recipe.size[1]);
+        if facts.clusters.is_none() {
+            let document = store.array_document("index")?;
+            let wide = document.get("data_type").and_then(Value::as_str) == Some("uint16");
+            facts.clusters = Some(if wide { MOST_CLUSTERS } else { NARROW });
+        }
+        if recipe.source && facts.tile.is_none() {
+            let document = store.array_document("source")?;
+            let tile = document.get("attributes").and_then(|attributes| attributes.get("tile"));
+            facts.tile = serde_json::from_value(tile.cloned().unwrap_or_default()).ok();
+        }
+        let wide = facts.clusters.is_some_and(|clusters| clusters > NARROW);
+        let index = store.open_array("index", &index_layout(size, wide))?;
+        let source = match (recipe.source, facts.tile) {
+            (false, _) => None,
+            (true, Some([height, width])) => {
+                Some(store.open_array("source", &source_layout(size, Size::new(height, width)))?)
+            }
+            (true, None) => {
+                let what = format!("{}: source: attribute tile: none", path.display());
+                return Err(Error::input(what).hint("enlarge anew, under another name"));
+            }
         };
-        let keeps = |name: &str| attributes.get("recipe").and_then(|r| r.get(name)?.as_bool()) == Some(true);
-        let source = keeps("source").then(|| store.open_array("source")).transpose()?;
-        let normals = keeps("keep_normals").then(|| store.open_array("normals")).transpose()?;
-        for (name, array) in [("source", &source), ("normals", &normals)] {
-            let shape = array.as_ref().map_or(index.shape(), |array| array.shape());
-            if !shape.starts_with(index.shape()) {
-                return Err(Error::input(format!(
-                    "{}: {name}: got shape {shape:?}, expected the {height} rows and {width} columns of the index",
-                    path.display()
-                )));
+        let normals =
+            recipe.keep_normals.then(|| store.open_array("normals", &normals_layout(size))).transpose()?;
+        Ok(Self { store, facts, size, wide, index, source, normals, _lock: None })
+    }
+
+    /// Declares it finished, if all shards are there: its root then holds checksums, and the metadata of all arrays for
+    /// other programs.
+    ///
+    /// # Errors
+    /// Those of reading and writing, and where a shard's index is damaged.
+    pub fn finish(&self, context: &Context<'_>) -> Result<()> {
+        if !self.is_whole() {
+            return Ok(());
+        }
+        let sums: Map<String, Value> = self
+            .arrays()
+            .map(|array| Ok((array.name().to_owned(), json!(self.store.checksums(array)?))))
+            .collect::<Result<_>>()?;
+        let _lock = self.store.lock("", context)?;
+        let mut attributes = self.store.expect(KIND)?;
+        attributes.insert(CHECKSUMS.to_owned(), Value::Object(sums));
+        let names: Vec<String> = self.arrays().map(|array| array.name().to_owned()).collect();
+        self.store.write_finished(attributes, &names)
+    }
+
+    /// The arrays that there are.
+    fn arrays(&self) -> impl Iterator<Item = &Array> {
+        std::iter::once(&self.index).chain(&self.source).chain(&self.normals)
+    }
+
+    /// Whether it was declared finished: then its shards have checksums.
+    ///
+    /// # Errors
+    /// Those of reading the attributes.
+    pub fn is_finished(&self) -> Result<bool> {
+        Ok(self.attributes()?.contains_key(CHECKSUMS))
+    }
+
+    /// Whether the root holds the metadata of all arrays as they are.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn is_consolidated(&self) -> Result<bool> {
+        let names: Vec<String> = self.arrays().map(|array| array.name().to_owned()).collect();
+        self.store.is_consolidated(&names)
+    }
+
+    /// The folders of rows of shards that are not those that were written, though each shard may be intact; none where no
+    /// checksums are kept.
+    ///
+    /// # Errors
+    /// Where a shard is missing, or its index is damaged.
+    pub fn exchanged(&self, shard_row: usize) -> Result<Vec<PathBuf>> {
+        let attributes = self.attributes()?;
+        let Some(kept) = attributes.get(CHECKSUMS) else { return Ok(Vec::new()) };
+        let mut folders = Vec::new();
+        for array in self.arrays() {
+            let kept = kept.get(array.name()).and_then(Value::as_str).unwrap_or_default();
+            let found = format!("{:08x}", self.store.checksum(array, shard_row as u64)?);
+            if kept.get(shard_row * DIGITS..(shard_row + 1) * DIGITS) != Some(found.as_str()) {
+                folders.push(self.store.path().join(array.name()).join("c").join(shard_row.to_string()));
             }
         }
-        let wide = *index.data_type() == u16::data_type();
-        Ok(Self {
-            store,
-            size: Size::new(height as usize, width as usize),
-            wide,
-            index,
-            source,
-            normals,
-            _lock: None,
-        })
+        Ok(folders)
     }
 
     /// Our attributes.
@@ -170,17 +279,44 @@ impl Enlarged {
         self.store.expect(KIND)
     }
 
+    /// Where it lies.
+    pub fn path(&self) -> &Path {
+        self.store.path()
+    }
+
+    /// Version of its layout.
+    pub fn format(&self) -> u64 {
+        self.store.format()
+    }
+
+    /// What made it.
+    pub fn recipe(&self) -> &Recipe {
+        &self.facts.recipe
+    }
+
+    /// Version of the program that began it.
+    pub fn version(&self) -> &str {
+        &self.facts.version
+    }
+
+    /// Name of the model that it was enlarged from.
+    pub fn model_name(&self) -> Option<&str> {
+        self.facts.model_name.as_deref()
+    }
+
+    /// Number of clusters of the model, or the most that the index can tell apart where it is not known.
+    pub fn clusters(&self) -> usize {
+        self.facts.clusters.unwrap_or(MOST_CLUSTERS)
+    }
+
+    /// Rows and columns of the tile, where they are known.
+    pub fn tile(&self) -> Option<Size> {
+        self.facts.tile.map(|[height, width]| Size::new(height, width))
+    }
+
     /// How it was enlarged.
-    ///
-    /// # Errors
-    /// A method that this program does not know.
-    pub fn method(&self) -> Result<Method> {
-        let attributes = self.attributes()?;
-        let Some(name) = attributes.get("recipe").and_then(|recipe| recipe.get("rule")) else {
-            return Ok(Method::default());
-        };
-        serde_json::from_value(name.clone())
-            .map_err(|error| Error::input(format!("{}: recipe: {error}", self.store.path().display())))
+    pub fn method(&self) -> Method {
+        self.facts.recipe.rule
     }
 
     /// Rows and columns.
@@ -207,11 +343,33 @@ impl Enlarged {
     pub fn has_shard(&self, shard_row: usize, shard_column: usize) -> bool {
         let place = [shard_row as u64, shard_column as u64];
         let has = |array: &Option<Array>, place: &[u64]| {
-            array.as_ref().is_none_or(|array| self.store.has_shard(array, place, SHARD_CHUNKS))
+            array.as_ref().is_none_or(|array| self.store.has_shard(array, place))
         };
-        self.store.has_shard(&self.index, &place, SHARD_CHUNKS)
+        self.store.has_shard(&self.index, &place)
             && has(&self.source, &place)
             && has(&self.normals, &[place[0], place[1], 0])
+    }
+
+    /// Rows and columns of the shards of the index that lie on the disk, in order: whatever size is claimed, no others are
+    /// looked for.
+    pub fn shards_found(&self) -> Vec<[usize; 2]> {
+        let Size { height, width } = self.shards();
+        let listed = |folder: &Path, end: usize| -> Vec<usize> {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let numbers = entries.filter_map(|entry| entry.file_name().to_string_lossy().parse().ok());
+            let mut numbers: Vec<usize> = numbers.filter(|&number| number < end).collect();
+            numbers.sort_unstable();
+            numbers
+        };
+        let folder = self.store.path().join("index").join("c");
+        let of_row =
+            |row: usize| listed(&folder.join(row.to_string()), width).into_iter().map(move |c| [row, c]);
+        listed(&folder, height).into_iter().flat_map(of_row).collect()
+    }
+
+    /// Number of shards that have been written.
+    pub fn shards_done(&self) -> usize {
+        self.shards_found().into_iter().filter(|&[row, column]| self.has_shard(row, column)).count()
     }
 
     /// Whether all shards have been written.
@@ -245,27 +403,103 @@ impl Enlarged {
     }
 
     /// Clusters of a window, row by row.
+    ///
+    /// # Errors
+    /// Those of reading, and a cluster beyond the last.
     pub fn read(&self, window: Window) -> Result<Vec<u16>> {
         let [start, extent] = bounds(window);
-        if self.wide {
-            return self.store.read_box::<u16>(&self.index, &start, &extent);
+        let index = if self.wide {
+            self.store.read_box::<u16>(&self.index, &start, &extent)?
+        } else {
+            self.store.read_box::<u8>(&self.index, &start, &extent)?.into_iter().map(u16::from).collect()
+        };
+        let clusters = self.clusters();
+        match index.iter().position(|&cluster| usize::from(cluster) >= clusters) {
+            None => Ok(index),
+            Some(at) => {
+                Err(self.beyond("index", window, at, &format!("cluster {} of {clusters}", index[at])))
+            }
         }
-        Ok(self.store.read_box::<u8>(&self.index, &start, &extent)?.into_iter().map(u16::from).collect())
     }
 
-    /// Source texels of a window, `row * width + column` in the tile, where they were kept. Not checked against the tile.
+    /// Source texels of a window, `row * width + column` in the tile, where they were kept.
+    ///
+    /// # Errors
+    /// Those of reading, and a texel beyond the tile.
     pub fn read_source(&self, window: Window) -> Result<Option<Vec<u32>>> {
+        let Some(array) = &self.source else { return Ok(None) };
         let [start, extent] = bounds(window);
-        self.source.as_ref().map(|array| self.store.read_box::<u32>(array, &start, &extent)).transpose()
+        let source = self.store.read_box::<u32>(array, &start, &extent)?;
+        let texels = self.tile().map_or(usize::MAX, Size::texels);
+        match source.iter().position(|&texel| texel as usize >= texels) {
+            None => Ok(Some(source)),
+            Some(at) => {
+                let what = format!("got texel {}, the tile has {texels}", source[at]);
+                Err(self.beyond("source", window, at, &what))
+            }
+        }
     }
 
     /// Normals of a window, where they were kept.
+    ///
+    /// # Errors
+    /// Those of reading, and what is no unit vector.
     pub fn read_normals(&self, window: Window) -> Result<Option<Vec<[f32; 3]>>> {
         let Some(array) = &self.normals else { return Ok(None) };
         let start = [window.y as u64, window.x as u64, 0];
         let extent = [window.size.height as u64, window.size.width as u64, 3];
         let values = self.store.read_box::<f32>(array, &start, &extent)?;
-        Ok(Some(values.chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect()))
+        let normals = values.as_chunks::<3>().0;
+        match normals.iter().position(|normal| !is_unit(normal)) {
+            None => Ok(Some(normals.to_vec())),
+            Some(at) => {
+                Err(self.beyond("normals", window, at, &format!("got {:?}, no unit vector", normals[at])))
+            }
+        }
+    }
+
+    /// What is wrong with a texel of a window.
+    fn beyond(&self, array: &str, window: Window, at: usize, what: &str) -> Error {
+        let (y, x) = (window.y + at / window.size.width, window.x + at % window.size.width);
+        let shard = self.store.path().join(array).join("c");
+        let shard = shard.join((y / SHARD_SIDE).to_string()).join((x / SHARD_SIDE).to_string());
+        Error::input(format!("{}: {array}: {what}, at row {y}, column {x}", shard.display())).hint(DAMAGED)
+    }
+}
+
+impl Facts {
+    /// Reads the attributes, and checks what does not need arrays.
+    fn read(store: &Store) -> Result<Self> {
+        let refused = |what: String| {
+            Error::input(format!("{}: attributes of btfkit: {what}", store.path().display()))
+                .hint("enlarge anew, under another name")
+        };
+        let attributes = Value::Object(store.expect(KIND)?);
+        let facts: Self = serde_json::from_value(attributes)
+            .map_err(|error| refused(format!("recipe or what lies beside it: {error}")))?;
+        let is_new = store.format() > OLDEST_FORMAT;
+        if is_new && (facts.clusters.is_none() || facts.tile.is_none()) {
+            return Err(refused("clusters or tile: none".to_owned()));
+        }
+        if facts.recipe.stage != "enlarge" {
+            return Err(refused(format!(
+                "recipe: got stage {}, expected enlarge",
+                json!(facts.recipe.stage)
+            )));
+        }
+        if facts.clusters.is_some_and(|clusters| !(1..=MOST_CLUSTERS).contains(&clusters)) {
+            return Err(refused(format!(
+                "clusters: got {:?}, expected 1 to {MOST_CLUSTERS}",
+                facts.clusters
+            )));
+        }
+        let sides = facts.recipe.size.iter().chain(facts.tile.iter().flatten());
+        match sides.clone().find(|side| !(1..=MOST_SIDE).contains(*side)) {
+            None => Ok(facts),
+            Some(side) => {
+                Err(refused(format!("size or tile: got a side of {side}, expected 1 to {MOST_SIDE}")))
+            }
+        }
     }
 }
 
@@ -294,30 +528,34 @@ fn bounds(window: Window) -> [[u64; 2]; 2] {
     [[window.y as u64, window.x as u64], [window.size.height as u64, window.size.width as u64]]
 }
 
-fn create<T: Named>(store: &Store, name: &str, size: Size, attributes: Map<String, Value>) -> Result<Array> {
-    let layout = Layout {
+/// A layout [y, x] in shards.
+fn plane_layout<T: Named>(size: Size) -> Layout<'static> {
+    Layout {
         codecs: None,
         shape: vec![size.height as u64, size.width as u64],
         chunk: vec![CHUNK_SIDE as u64; 2],
         shard: Some(vec![SHARD_SIDE as u64; 2]),
         data_type: T::data_type(),
         names: &["y", "x"],
-        attributes,
-    };
-    store.create_array(name, &layout)
+        attributes: Map::new(),
+    }
 }
 
-fn create_normals(store: &Store, size: Size) -> Result<Array> {
-    let mut attributes = Map::new();
-    attributes.insert("frame".to_owned(), json!("x right, y up, z out of the surface"));
-    let layout = Layout {
-        codecs: None,
-        shape: vec![size.height as u64, size.width as u64, 3],
-        chunk: vec![CHUNK_SIDE as u64, CHUNK_SIDE as u64, 3],
-        shard: Some(vec![SHARD_SIDE as u64, SHARD_SIDE as u64, 3]),
-        data_type: f32::data_type(),
-        names: &["y", "x", "xyz"],
-        attributes,
-    };
-    store.create_array("normals", &layout)
+fn index_layout(size: Size, wide: bool) -> Layout<'static> {
+    if wide { plane_layout::<u16>(size) } else { plane_layout::<u8>(size) }
+}
+
+fn source_layout(size: Size, tile: Size) -> Layout<'static> {
+    plane_layout::<u32>(size)
+        .with("meaning", "row * width + column of the tile's texel")
+        .with("tile", vec![tile.height, tile.width])
+}
+
+fn normals_layout(size: Size) -> Layout<'static> {
+    let mut layout = plane_layout::<f32>(size).with("frame", "x right, y up, z out of the surface");
+    layout.names = &["y", "x", "xyz"];
+    for lengths in [&mut layout.shape, &mut layout.chunk].into_iter().chain(&mut layout.shard) {
+        lengths.push(3);
+    }
+    layout
 }

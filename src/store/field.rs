@@ -11,16 +11,21 @@
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, json};
+use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
 use crate::mrf::car::Prior;
 use crate::mrf::marginals::{Marginals, Matching, NODES};
 use crate::mrf::{Coordinates, Kind, Level, Model, Surface};
+use crate::store::metadata::shown;
 use crate::store::{Layout, Store};
 
 /// Farthest site that a stored neighbourhood may have: rows as far back are kept in memory.
 const FARTHEST_SITE: u32 = 64;
+
+/// Most sites of a stored neighbourhood, and most levels: more than any fit makes.
+const MOST_SITES: usize = 4096;
+const MOST_LEVELS: usize = 32;
 
 /// What the attributes of stage `fit` tell of the field, beside its arrays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -88,11 +93,96 @@ impl FieldReport {
     }
 }
 
-/// Names of the arrays of some levels.
-pub(super) fn arrays(levels: usize) -> Vec<String> {
-    let of_level =
-        |level: usize| ["gamma", "sigma", "neighbourhood"].map(|name| format!("mrf/level_{level}/{name}"));
-    std::iter::once("mrf/mean".to_owned()).chain((0..levels).flat_map(of_level)).collect()
+impl FieldReport {
+    /// Checks the report against the recipe, which decides what is fitted.
+    pub(super) fn check(&self, recipe: &Value) -> std::result::Result<(), String> {
+        for (name, found) in
+            [("mrf", json!(self.mrf)), ("field", json!(self.field)), ("marginals", json!(self.marginals))]
+        {
+            let expected = recipe.get(name).unwrap_or(&Value::Null);
+            if found != *expected {
+                return Err(format!("{name}: got {found}, the recipe says {}", shown(expected)));
+            }
+        }
+        let levels = recipe.get("levels").and_then(Value::as_u64);
+        if levels.is_some_and(|levels| levels != self.levels.len() as u64)
+            || !(1..=MOST_LEVELS).contains(&self.levels.len())
+        {
+            return Err(format!("got {} levels, the recipe says {levels:?}", self.levels.len()));
+        }
+        match self.levels.iter().position(|level| !(1..=MOST_SITES).contains(&level.eta)) {
+            None => Ok(()),
+            Some(k) => {
+                Err(format!("level {k}: got {} sites, expected 1 to {MOST_SITES}", self.levels[k].eta))
+            }
+        }
+    }
+
+    fn channels(&self) -> usize {
+        self.field.channels()
+    }
+}
+
+/// The arrays of a field.
+pub(super) fn arrays(report: &FieldReport) -> Vec<(String, Layout<'static>)> {
+    let channels = report.channels();
+    let mut arrays = vec![
+        ("mrf/mean".to_owned(), mean_layout(channels)),
+        ("mrf/covariance".to_owned(), square_layout(channels)),
+        ("mrf/gain".to_owned(), gain_layout(report.levels.len())),
+    ];
+    if report.mrf == Kind::Car2d {
+        arrays.push(("mrf/transform".to_owned(), transform_layout(channels)));
+    }
+    if report.marginals.is_some() {
+        arrays.push(("mrf/marginals".to_owned(), marginals_layout()));
+    }
+    for (number, level) in report.levels.iter().enumerate() {
+        let group = level_group(number);
+        arrays.push((format!("{group}/gamma"), gamma_layout(report.mrf, channels, level.eta)));
+        arrays.push((format!("{group}/sigma"), sigma_layout(report.mrf, channels)));
+        arrays.push((format!("{group}/neighbourhood"), neighbourhood_layout(level.eta)));
+    }
+    arrays
+}
+
+fn level_group(number: usize) -> String {
+    format!("mrf/level_{number}")
+}
+
+// The channels of the field are not those of the samples, so they have another name.
+
+fn mean_layout(channels: usize) -> Layout<'static> {
+    Layout::small::<f64>(&["field_channel"], &[channels])
+}
+
+fn square_layout(channels: usize) -> Layout<'static> {
+    Layout::small::<f64>(&["field_channel", "field_channel_other"], &[channels, channels])
+}
+
+fn transform_layout(channels: usize) -> Layout<'static> {
+    Layout::small::<f64>(&["component", "field_channel"], &[channels, channels])
+}
+
+fn gain_layout(levels: usize) -> Layout<'static> {
+    Layout::small::<f64>(&["level"], &[levels])
+}
+
+fn marginals_layout() -> Layout<'static> {
+    Layout::small::<f32>(&["z1", "z2", "xy"], &[NODES, NODES, 2]).with("z", "-4 to 4 in steps of 1/16")
+}
+
+fn gamma_layout(kind: Kind, channels: usize, sites: usize) -> Layout<'static> {
+    let columns = if kind == Kind::Car3d { channels * sites } else { sites };
+    Layout::small::<f64>(&["field_channel", "coefficient"], &[channels, columns])
+}
+
+fn sigma_layout(kind: Kind, channels: usize) -> Layout<'static> {
+    if kind == Kind::Car3d { square_layout(channels) } else { mean_layout(channels) }
+}
+
+fn neighbourhood_layout(sites: usize) -> Layout<'static> {
+    Layout::small::<i32>(&["site", "dy_dx"], &[sites, 2])
 }
 
 /// Writes a surface's model under `mrf/`.
@@ -100,35 +190,29 @@ pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
     let field = &surface.field;
     store.write_group("mrf", Map::new())?;
     let channels = field.channels();
-    store.write("mrf/mean", &Layout::small::<f64>(&["channel"], &[channels]), &field.mean)?;
+    store.write("mrf/mean", &mean_layout(channels), &field.mean)?;
     if let Some(transform) = &field.transform {
-        let layout = Layout::small::<f64>(&["component", "channel"], &[channels, channels]);
-        store.write("mrf/transform", &layout, &rows(transform))?;
+        store.write("mrf/transform", &transform_layout(channels), &rows(transform))?;
     }
-    let square = Layout::small::<f64>(&["channel", "channel_other"], &[channels, channels]);
-    store.write("mrf/covariance", &square, &rows(&field.covariance))?;
+    store.write("mrf/covariance", &square_layout(channels), &rows(&field.covariance))?;
     let gains: Vec<f64> = field.levels.iter().map(|level| level.gain).collect();
-    store.write("mrf/gain", &Layout::small::<f64>(&["level"], &[gains.len()]), &gains)?;
+    store.write("mrf/gain", &gain_layout(gains.len()), &gains)?;
     if let Some(marginals) = &surface.marginals {
-        let mut layout = Layout::small::<f32>(&["z1", "z2", "xy"], &[NODES, NODES, 2]);
-        layout.attributes.insert("z".to_owned(), json!("-4 to 4 in steps of 1/16"));
         let table: Vec<f32> = marginals.table().iter().flatten().copied().collect();
-        store.write("mrf/marginals", &layout, &table)?;
+        store.write("mrf/marginals", &marginals_layout(), &table)?;
     }
     for (number, level) in field.levels.iter().enumerate() {
-        let group = format!("mrf/level_{number}");
+        let group = level_group(number);
+        let sites = level.neighbourhood.len();
         store.write_group(&group, Map::new())?;
-        let layout =
-            Layout::small::<f64>(&["channel", "coefficient"], &[level.gamma.nrows(), level.gamma.ncols()]);
-        store.write(&format!("{group}/gamma"), &layout, &rows(&level.gamma))?;
-        let layout = match field.kind {
-            Kind::Car3d => Layout::small::<f64>(&["channel", "channel_other"], &[channels, channels]),
-            Kind::Car2d => Layout::small::<f64>(&["channel"], &[channels]),
-        };
-        store.write(&format!("{group}/sigma"), &layout, &rows(&level.sigma))?;
-        let sites: Vec<i32> = level.neighbourhood.iter().flatten().copied().collect();
-        let layout = Layout::small::<i32>(&["site", "dy_dx"], &[level.neighbourhood.len(), 2]);
-        store.write(&format!("{group}/neighbourhood"), &layout, &sites)?;
+        store.write(
+            &format!("{group}/gamma"),
+            &gamma_layout(field.kind, channels, sites),
+            &rows(&level.gamma),
+        )?;
+        store.write(&format!("{group}/sigma"), &sigma_layout(field.kind, channels), &rows(&level.sigma))?;
+        let neighbours = level.neighbourhood.as_flattened();
+        store.write(&format!("{group}/neighbourhood"), &neighbourhood_layout(sites), neighbours)?;
     }
     Ok(())
 }
@@ -136,27 +220,31 @@ pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
 /// Reads a surface's model; `report` is that of stage `fit`.
 pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
     let (kind, coordinates) = (report.mrf, report.field);
-    let channels = coordinates.channels();
-    let square = |name: &str| -> Result<DMatrix<f64>> {
-        let (_, values) = store.read::<f64>(name, &[channels, channels])?;
-        Ok(DMatrix::from_row_slice(channels, channels, &values))
+    let channels = report.channels();
+    let square = |name: &str, layout: &Layout<'_>| -> Result<DMatrix<f64>> {
+        Ok(DMatrix::from_row_slice(channels, channels, &store.read_array::<f64>(name, layout)?))
     };
-    let (_, mean) = store.read::<f64>("mrf/mean", &[channels])?;
-    let transform = (kind == Kind::Car2d).then(|| square("mrf/transform")).transpose()?;
-    let covariance = square("mrf/covariance")?;
-    let (_, gains) = store.read::<f64>("mrf/gain", &[report.levels.len()])?;
+    let mean = store.read_array::<f64>("mrf/mean", &mean_layout(channels))?;
+    let transform =
+        (kind == Kind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
+    let covariance = square("mrf/covariance", &square_layout(channels))?;
+    let gains = store.read_array::<f64>("mrf/gain", &gain_layout(report.levels.len()))?;
     let levels = report
         .levels
         .iter()
         .zip(gains)
         .enumerate()
-        .map(|(number, (report, gain))| read_level(store, number, gain, kind, channels, report))
+        .map(|(number, (level, gain))| read_level(store, number, gain, kind, channels, level))
         .collect::<Result<Vec<Level>>>()?;
     let autocovariance_error = report.autocovariance_error;
     let field = Model { kind, mean, transform, levels, covariance, autocovariance_error };
-    field.check().map_err(|error| error.context(store.path().display()))?;
+    field.check().map_err(|error| {
+        error
+            .context(store.path().display())
+            .hint("the field is damaged: make the model anew, under another name")
+    })?;
     let read_marginals = |matching| {
-        let (_, values) = store.read::<f32>("mrf/marginals", &[NODES, NODES, 2])?;
+        let values = store.read_array::<f32>("mrf/marginals", &marginals_layout())?;
         let table = values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();
         Marginals::from_table(matching, table, &field.mean, &field.covariance)
             .map_err(|error| error.context(format!("{}: mrf/marginals", store.path().display())))
@@ -173,22 +261,21 @@ fn read_level(
     channels: usize,
     report: &LevelReport,
 ) -> Result<Level> {
-    let group = format!("mrf/level_{number}");
-    let (_, sites) = store.read::<i32>(&format!("{group}/neighbourhood"), &[0, 2])?;
-    let neighbourhood: Vec<[i32; 2]> = sites.chunks_exact(2).map(|s| [s[0], s[1]]).collect();
+    let group = level_group(number);
+    let sites =
+        store.read_array::<i32>(&format!("{group}/neighbourhood"), &neighbourhood_layout(report.eta))?;
+    let neighbourhood: Vec<[i32; 2]> = sites.as_chunks::<2>().0.to_vec();
     let near = |[dy, dx]: &[i32; 2]| dy.unsigned_abs().max(dx.unsigned_abs()) <= FARTHEST_SITE;
-    if neighbourhood.is_empty() || !neighbourhood.iter().all(near) {
+    if !neighbourhood.iter().all(near) {
         return Err(Error::input(format!(
-            "{}: {group}/neighbourhood: expected at least one site, none farther than {FARTHEST_SITE}",
+            "{}: {group}/neighbourhood: expected no site farther than {FARTHEST_SITE}",
             store.path().display()
         )));
     }
-    let (columns, sigma_shape) = match kind {
-        Kind::Car3d => (channels * neighbourhood.len(), vec![channels, channels]),
-        Kind::Car2d => (neighbourhood.len(), vec![channels]),
-    };
-    let (_, gamma) = store.read::<f64>(&format!("{group}/gamma"), &[channels, columns])?;
-    let (_, sigma) = store.read::<f64>(&format!("{group}/sigma"), &sigma_shape)?;
+    let gamma_layout = gamma_layout(kind, channels, report.eta);
+    let columns = gamma_layout.shape[1] as usize;
+    let gamma = store.read_array::<f64>(&format!("{group}/gamma"), &gamma_layout)?;
+    let sigma = store.read_array::<f64>(&format!("{group}/sigma"), &sigma_layout(kind, channels))?;
     Ok(Level {
         neighbourhood,
         gamma: DMatrix::from_row_slice(channels, columns, &gamma),

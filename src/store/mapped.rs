@@ -229,6 +229,20 @@ fn remove_abandoned(path: &Path) {
     drop(opened);
 }
 
+/// Refuses what is no file: folders, pipes, devices and sockets.
+pub(crate) fn refuse_special(data: &fs::Metadata) -> io::Result<()> {
+    use std::os::unix::fs::FileTypeExt;
+    let kind = data.file_type();
+    let what = match kind {
+        _ if kind.is_file() => return Ok(()),
+        _ if kind.is_dir() => "a folder",
+        _ if kind.is_fifo() => "a pipe",
+        _ if kind.is_socket() => "a socket",
+        _ => "a device",
+    };
+    Err(io::Error::new(io::ErrorKind::InvalidInput, format!("got {what}, expected a file")))
+}
+
 /// A file mapped for reading.
 pub struct MappedFile {
     /// None for an empty file, which cannot be mapped.
@@ -242,6 +256,8 @@ impl MappedFile {
     /// Those of opening and mapping.
     #[allow(unsafe_code)]
     pub fn open(path: &Path) -> io::Result<Self> {
+        // Opening a pipe would wait for a writer.
+        refuse_special(&fs::metadata(path)?)?;
         let file = File::open(path)?;
         if file.metadata()?.len() == 0 {
             return Ok(Self { map: None });

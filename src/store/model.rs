@@ -3,10 +3,12 @@
 //! Each stage (`tile`, `cluster`, `normals`, `fit`, `appearance`) writes its arrays and then, last, its entry in
 //! the attributes: arrays without their entry are the remains of a run that was killed.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use btfkit_formats::Samples;
+use btfkit_formats::{Direction, SampleType, Samples};
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::coherent::Appearance;
@@ -16,16 +18,25 @@ use crate::mrf::Surface;
 use crate::run::{Context, recipe};
 use crate::shape::Size;
 use crate::store::appearance::{self, AppearanceReport};
-use crate::store::field;
-use crate::store::measurement::{Description, read_directions, write_directions};
+use crate::store::checksums::DIGITS;
+use crate::store::field::{self, FieldReport};
+use crate::store::measurement::Description;
 use crate::store::output::Existing;
-use crate::store::{Layout, Lock, Named, Store};
+use crate::store::tile_report::TileReport;
+use crate::store::{
+    Array, DAMAGED, Layout, Lock, Named, SAMPLE_TYPES, Store, data_type_of, directions, metadata,
+};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::triangulate;
-use btfkit_formats::Direction;
 
 /// The attribute `kind` of a model store.
 pub const KIND: &str = "model";
+
+/// Most clusters: the index is u16.
+const MOST_CLUSTERS: usize = 1 << 16;
+
+/// How far from 1 the length of a unit normal in f32 may be.
+pub(crate) const UNIT_TOLERANCE: f32 = 1e-4;
 
 /// The stages of an analysis, in the order of the data flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +54,6 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All of them, in their order.
-    pub const ALL: [Self; 5] = [Self::Tile, Self::Cluster, Self::Normals, Self::Fit, Self::Appearance];
-
     /// Its name, as a command and as an entry in the attributes.
     pub fn name(self) -> &'static str {
         match self {
@@ -57,6 +65,9 @@ impl Stage {
         }
     }
 
+    /// All of them, in the order of the data flow.
+    pub const ALL: [Self; 5] = [Self::Tile, Self::Cluster, Self::Normals, Self::Fit, Self::Appearance];
+
     /// The stages that build on it, directly or not, in the order of the data flow.
     fn builders(self) -> &'static [Self] {
         match self {
@@ -67,27 +78,33 @@ impl Stage {
         }
     }
 
-    /// Its arrays; `report` is that of the stage.
-    fn arrays(self, report: Option<&Value>) -> Vec<String> {
-        let levels =
-            report.and_then(|report| report.get("levels")).and_then(Value::as_array).map_or(0, Vec::len);
-        let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+    /// The stage that it works on the result of, and the member of its recipe that names that one's digest.
+    pub fn input(self) -> Option<(Self, &'static str)> {
         match self {
-            Self::Tile => names(&[
-                "tile_source",
-                "view_direction",
-                "light_direction",
-                "view_triangles",
-                "light_triangles",
-            ]),
-            Self::Cluster => {
-                names(&["index", "centres", "representatives", "representative_texel", "distance"])
-            }
-            Self::Normals => names(&["normals"]),
-            Self::Fit => field::arrays(levels),
-            Self::Appearance => appearance::arrays(levels),
+            Self::Tile => None,
+            Self::Cluster | Self::Normals => Some((Self::Tile, "tile")),
+            Self::Fit => Some((Self::Normals, "normals")),
+            Self::Appearance => Some((Self::Cluster, "cluster")),
         }
     }
+}
+
+/// What the attributes hold of a stage that is done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    recipe: Value,
+    digest: String,
+    report: Value,
+    /// Of its arrays, by name; not in the oldest layout.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    checksums: Option<BTreeMap<String, String>>,
+}
+
+/// As much of the report of stage `cluster` as the arrays are read by.
+#[derive(Deserialize)]
+struct ClusterFacts {
+    clusters: usize,
 }
 
 /// Name of the lock of a stage.
@@ -103,7 +120,7 @@ pub struct Model {
 impl Model {
     /// Opens a model, or begins one where there is none.
     pub fn create(path: &Path, context: &Context<'_>) -> Result<Self> {
-        let store = Store::at(path);
+        let mut store = Store::at(path);
         let mut attributes = Map::new();
         attributes.insert("stages".to_owned(), json!({}));
         store.begin(KIND, attributes, context)?;
@@ -113,9 +130,9 @@ impl Model {
 
     /// Opens a model for reading.
     pub fn open(path: &Path) -> Result<Self> {
-        let store = Store::at(path);
-        store.expect(KIND)?;
-        Ok(Self { store })
+        let model = Self { store: Store::open(path, KIND)?.0 };
+        model.entries()?;
+        Ok(model)
     }
 
     /// Where it lies.
@@ -123,20 +140,62 @@ impl Model {
         self.store.path()
     }
 
+    /// Version of its layout.
+    pub fn format(&self) -> u64 {
+        self.store.format()
+    }
+
+    /// Version of the program that began it.
+    pub fn version(&self) -> Result<String> {
+        let attributes = self.store.expect(KIND)?;
+        Ok(attributes.get("version").and_then(Value::as_str).unwrap_or_default().to_owned())
+    }
+
+    /// The stages that are done.
+    fn entries(&self) -> Result<BTreeMap<String, Entry>> {
+        let attributes = self.store.expect(KIND)?;
+        let damaged = |what: String| {
+            Error::input(format!("{}: attribute btfkit.stages: {what}", self.path().display()))
+                .hint("make the model anew, under another name")
+        };
+        let stages = attributes.get("stages").cloned().unwrap_or_default();
+        let entries: BTreeMap<String, Entry> =
+            serde_json::from_value(stages.clone()).map_err(|error| damaged(error.to_string()))?;
+        for (name, entry) in &entries {
+            if !Stage::ALL.iter().any(|stage| stage.name() == name) {
+                return Err(damaged(format!("no stage is called {}", json!(name))));
+            }
+            if entry.digest != recipe::digest(&entry.recipe) {
+                return Err(damaged(format!("{name}: digest: it is not that of the recipe")));
+            }
+            if entry.checksums.is_none() && self.store.format() > metadata::OLDEST_FORMAT {
+                return Err(damaged(format!("{name}: no checksums")));
+            }
+        }
+        Ok(entries)
+    }
+
+    fn entry(&self, stage: Stage) -> Result<Option<Entry>> {
+        Ok(self.entries()?.remove(stage.name()))
+    }
+
+    fn done(&self, stage: Stage) -> Result<Entry> {
+        self.entry(stage)?.ok_or_else(|| {
+            Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
+                .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
+        })
+    }
+
     /// The attributes of a stage that is done: `recipe`, `digest` and `report`.
     pub fn stage(&self, stage: Stage) -> Result<Option<Map<String, Value>>> {
-        let attributes = self.store.expect(KIND)?;
-        let entry = attributes.get("stages").and_then(|stages| stages.get(stage.name()));
-        Ok(entry.and_then(Value::as_object).cloned())
+        let Some(entry) = self.entry(stage)? else { return Ok(None) };
+        let members = [("recipe", entry.recipe), ("digest", json!(entry.digest)), ("report", entry.report)];
+        Ok(Some(members.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()))
     }
 
     /// Digest of a stage that must be done.
     pub fn stage_digest(&self, stage: Stage) -> Result<String> {
-        let entry = self.stage(stage)?.ok_or_else(|| {
-            Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
-                .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
-        })?;
-        Ok(entry.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned())
+        Ok(self.done(stage)?.digest)
     }
 
     /// Digest of some stages together.
@@ -160,14 +219,22 @@ impl Model {
         if context.existing == Existing::Replace {
             self.take_back(stage, recipe, context)?;
         }
-        Ok(if self.is_done(stage, recipe)? { None } else { Some(lock) })
+        if !self.is_done(stage, recipe)? {
+            return Ok(Some(lock));
+        }
+        // Another program may have changed an array's attributes since.
+        if !self.is_consolidated().unwrap_or(true) {
+            let _lock = self.store.lock("", context)?;
+            self.write_root(self.store.expect(KIND)?)?;
+        }
+        Ok(None)
     }
 
     /// Takes back a stage that another recipe made, and those that build on it: their entries first, then their arrays.
     fn take_back(&self, stage: Stage, recipe: &Value, context: &Context<'_>) -> Result<()> {
-        let Some(entry) = self.stage(stage)? else { return Ok(()) };
-        if entry.get("digest").and_then(Value::as_str) == Some(recipe::digest(recipe).as_str()) {
-            return Ok(());
+        match self.entry(stage)? {
+            Some(entry) if entry.digest != recipe::digest(recipe) => {}
+            _ => return Ok(()),
         }
         // In the order of the data flow, as everybody takes them.
         let _later: Vec<Lock> = stage
@@ -183,7 +250,9 @@ impl Model {
             let Some(stages) = stages else { return Ok(()) };
             for taken in stage.builders().iter().chain([&stage]) {
                 if let Some(entry) = stages.remove(taken.name()) {
-                    arrays.extend(taken.arrays(entry.get("report")));
+                    let report = entry.get("report").cloned().unwrap_or_default();
+                    let of_stage = self.arrays(*taken, &report).unwrap_or_default();
+                    arrays.extend(of_stage.into_iter().map(|(name, _)| name));
                     if *taken != stage {
                         context.progress.notice(&format!(
                             "{}: stage {} built on what is made anew: run it again (btf {}, or btf model)",
@@ -194,7 +263,7 @@ impl Model {
                     }
                 }
             }
-            self.store.write_group("", attributes)?;
+            self.write_root(attributes)?;
         }
         for array in arrays {
             self.store.remove(&array)?;
@@ -210,7 +279,17 @@ impl Model {
         let Some(entry) = self.stage(stage)? else { return Ok(false) };
         let place = format!("{} ({})", self.path().display(), stage.name());
         recipe::expect_same(Path::new(&place), &entry, recipe)?;
-        Ok(stage.arrays(entry.get("report")).iter().all(|array| self.store.is_whole(array)))
+        self.has_arrays(stage)
+    }
+
+    /// Whether the arrays of a stage that is done are all there.
+    pub fn has_arrays(&self, stage: Stage) -> Result<bool> {
+        let report = self.done(stage)?.report;
+        // Arrays that do not even have their metadata are not there.
+        let Ok(arrays) = self.arrays(stage, &report) else { return Ok(false) };
+        Ok(arrays.iter().all(|(name, layout)| {
+            self.store.open_array(name, layout).is_ok_and(|array| self.store.has_all(&array))
+        }))
     }
 
     /// Declares a stage done; to be called after its arrays are written.
@@ -218,37 +297,178 @@ impl Model {
         &self,
         stage: Stage,
         recipe: &Value,
-        report: &impl serde::Serialize,
+        report: &impl Serialize,
         context: &Context<'_>,
     ) -> Result<()> {
+        let failed = |error: serde_json::Error| Error::internal(error.to_string());
+        let report = serde_json::to_value(report).map_err(failed)?;
+        let checksum = |(name, layout): (String, Layout<'_>)| {
+            let array = self.store.open_array(&name, &layout)?;
+            Ok((name, self.store.checksums(&array)?))
+        };
+        let checksums = self.arrays(stage, &report)?.into_iter().map(checksum).collect::<Result<_>>()?;
+        let digest = recipe::digest(recipe);
+        let entry = Entry { recipe: recipe.clone(), digest, report, checksums: Some(checksums) };
         // Another stage may be writing its own entry.
         let _lock = self.store.lock("", context)?;
         let mut attributes = self.store.expect(KIND)?;
-        let report = serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))?;
-        let entry = json!({"recipe": recipe, "digest": recipe::digest(recipe), "report": report});
         if let Some(stages) = attributes.get_mut("stages").and_then(Value::as_object_mut) {
-            stages.insert(stage.name().to_owned(), entry);
+            stages.insert(stage.name().to_owned(), serde_json::to_value(entry).map_err(failed)?);
         }
-        self.store.write_group("", attributes)
+        self.write_root(attributes)
     }
 
-    /// The report of a stage that is done.
-    pub fn report<T: serde::de::DeserializeOwned>(&self, stage: Stage) -> Result<T> {
-        self.stage_digest(stage)?;
-        let entry = self.stage(stage)?.unwrap_or_default();
-        serde_json::from_value(entry.get("report").cloned().unwrap_or_default()).map_err(|error| {
+    /// Writes the root with the metadata of the arrays of all stages that are done, as far as they are there.
+    fn write_root(&self, attributes: Map<String, Value>) -> Result<()> {
+        let names = |(name, entry): (&String, &Value)| {
+            let stage = Stage::ALL.into_iter().find(|stage| stage.name() == name)?;
+            let report = entry.get("report")?;
+            Some(self.arrays(stage, report).ok()?.into_iter().map(|(name, _)| name))
+        };
+        let stages = attributes.get("stages").and_then(Value::as_object);
+        let arrays: Option<Vec<_>> = stages.into_iter().flatten().map(names).collect();
+        let arrays: Option<Vec<String>> = arrays.map(|arrays| arrays.into_iter().flatten().collect());
+        match arrays.filter(|arrays| self.store.consolidated(arrays).is_ok()) {
+            Some(arrays) => self.store.write_finished(attributes, &arrays),
+            None => self.store.write_group("", attributes),
+        }
+    }
+
+    /// Whether the root holds the metadata of all arrays as they are.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn is_consolidated(&self) -> Result<bool> {
+        let mut names = Vec::new();
+        for stage in Stage::ALL {
+            if let Some(entry) = self.entry(stage)? {
+                names.extend(self.arrays(stage, &entry.report)?.into_iter().map(|(name, _)| name));
+            }
+        }
+        self.store.is_consolidated(&names)
+    }
+
+    /// The arrays of a stage with this report.
+    fn arrays(&self, stage: Stage, report: &Value) -> Result<Vec<(String, Layout<'static>)>> {
+        Ok(match stage {
+            Stage::Tile => {
+                let report: TileReport = self.typed(stage, report)?;
+                let mut arrays = vec![("tile_source".to_owned(), tile_layout(report.size()))];
+                for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
+                    let names = directions::layouts(dimension, directions.len(), self.store.format());
+                    arrays.extend(names);
+                    let count = triangulate(&directions).len();
+                    arrays.push((format!("{dimension}_triangles"), triangle_layout(dimension, count)));
+                }
+                arrays
+            }
+            Stage::Cluster => {
+                let ClusterFacts { clusters } = self.typed(stage, report)?;
+                let tile = self.tile_report()?;
+                let [views, lights] = self.directions()?.map(|list| list.len());
+                let (channels, samples) = self.values()?;
+                [
+                    ("index", index_layout(tile.size(), clusters)),
+                    ("centres", centres_layout([clusters, views, lights])),
+                    (
+                        "representatives",
+                        representatives_layout([clusters, views, lights], &channels, samples),
+                    ),
+                    ("representative_texel", texel_layout(clusters)),
+                    ("distance", distance_layout(clusters)),
+                ]
+                .map(|(name, layout)| (name.to_owned(), layout))
+                .into()
+            }
+            Stage::Normals => vec![("normals".to_owned(), normals_layout(self.tile_report()?.size()))],
+            Stage::Fit => field::arrays(&self.typed(stage, report)?),
+            Stage::Appearance => {
+                let report: AppearanceReport = self.typed(stage, report)?;
+                appearance::arrays(&report, self.clusters()?)
+            }
+        })
+    }
+
+    /// Opens an array of a stage.
+    fn open_array(&self, stage: Stage, name: &str, layout: &Layout<'_>) -> Result<Array> {
+        let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
+            crate::Kind::Missing => {
+                error.hint(format!("run `btf {}` (or `btf model`) on it again", stage.name()))
+            }
+            _ => error,
+        })?;
+        let kept = self.done(stage)?.checksums;
+        let Some(kept) = kept else { return Ok(array) };
+        let kept = kept.get(name).map(String::as_str).unwrap_or_default();
+        let found = self.store.checksums(&array)?;
+        if found == kept {
+            return Ok(array);
+        }
+        let row = (0..array.grid()[0]).find(|&row| {
+            let digits = row as usize * DIGITS..(row as usize + 1) * DIGITS;
+            kept.get(digits.clone()) != found.get(digits)
+        });
+        let mut place = vec![0; array.shape().len()];
+        place[0] = row.unwrap_or(0);
+        let file = self.store.chunk_path(&array, &place);
+        let what = "its checksum is not the one that was kept: another chunk in its place, or a damaged one";
+        Err(Error::input(format!("{}: {what}", file.display())).hint(DAMAGED))
+    }
+
+    /// Reads an array of a stage.
+    fn read<T: Named>(&self, stage: Stage, name: &str, layout: &Layout<'_>) -> Result<Vec<T>> {
+        let array = self.open_array(stage, name, layout)?;
+        self.store.read_box(&array, &vec![0; array.shape().len()], array.shape())
+    }
+
+    fn typed<T: serde::de::DeserializeOwned>(&self, stage: Stage, report: &Value) -> Result<T> {
+        serde_json::from_value(report.clone()).map_err(|error| {
             Error::input(format!("{}: report of {}: {error}", self.path().display(), stage.name()))
                 .hint("if another version of the program made this model, make it anew")
         })
     }
 
+    /// The report of a stage that is done.
+    pub fn report<T: serde::de::DeserializeOwned>(&self, stage: Stage) -> Result<T> {
+        self.typed(stage, &self.done(stage)?.report)
+    }
+
+    /// How the tile was cut.
+    pub fn tile_report(&self) -> Result<TileReport> {
+        let entry = self.done(Stage::Tile)?;
+        let report: TileReport = self.typed(Stage::Tile, &entry.report)?;
+        report.check(&entry.recipe).map_err(|what| {
+            Error::input(format!("{}: report of tile: {what}", self.path().display()))
+                .hint("make the model anew, under another name")
+        })?;
+        Ok(report)
+    }
+
+    /// Names of the channels, and type of the samples, of the representatives.
+    fn values(&self) -> Result<(Vec<String>, SampleType)> {
+        let report = self.tile_report()?;
+        if let Some(values) = report.values() {
+            return Ok(values);
+        }
+        // The oldest layout has them beside the array only.
+        let document = self.store.array_document("representatives")?;
+        let names = document.get("attributes").and_then(|attributes| attributes.get("channels"));
+        let names = serde_json::from_value(names.cloned().unwrap_or_default());
+        let name = document.get("data_type").and_then(Value::as_str).unwrap_or_default();
+        let samples = SAMPLE_TYPES.into_iter().find(|samples| samples.name() == name);
+        names
+            .ok()
+            .zip(samples)
+            .ok_or_else(|| self.damaged("representatives", "no names of channels, or no samples"))
+    }
+
     /// Writes the directions of the measurement and their triangulations.
     pub fn write_directions(&self, description: &Description) -> Result<()> {
         for (dimension, directions) in [("view", &description.views), ("light", &description.lights)] {
-            write_directions(&self.store, &format!("{dimension}_direction"), dimension, directions)?;
+            directions::write(&self.store, dimension, directions)?;
             let triangles = triangulate(directions);
             let corners: Vec<u16> = triangles.iter().flatten().copied().collect();
-            let layout = Layout::small::<u16>(&["triangle", "corner"], &[triangles.len(), 3]);
+            let layout = triangle_layout(dimension, triangles.len());
             self.store.write(&format!("{dimension}_triangles"), &layout, &corners)?;
         }
         Ok(())
@@ -256,83 +476,125 @@ impl Model {
 
     /// View directions and light directions.
     pub fn directions(&self) -> Result<[Vec<Direction>; 2]> {
-        Ok([
-            read_directions(&self.store, "view_direction")?,
-            read_directions(&self.store, "light_direction")?,
-        ])
+        Ok([directions::read(&self.store, "view")?, directions::read(&self.store, "light")?])
+    }
+
+    /// Checks that the coordinates by which other programs select are the directions.
+    ///
+    /// # Errors
+    /// Where they are not.
+    pub fn check_coordinates(&self) -> Result<()> {
+        for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
+            directions::check_coordinates(&self.store, dimension, &directions)?;
+        }
+        Ok(())
     }
 
     /// Triangles of the views and of the lights: numbers of three directions each.
+    ///
+    /// # Errors
+    /// Where they are not the spherical Delaunay triangles of the directions.
     pub fn triangles(&self) -> Result<[Vec<[u16; 3]>; 2]> {
-        let read = |name: &str| -> Result<Vec<[u16; 3]>> {
-            let (_, corners) = self.store.read::<u16>(name, &[0, 3])?;
-            Ok(corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect())
+        let [views, lights] = self.directions()?;
+        let read = |dimension: &str, directions: &[Direction]| -> Result<Vec<[u16; 3]>> {
+            let expected = triangulate(directions);
+            let name = format!("{dimension}_triangles");
+            let corners =
+                self.read::<u16>(Stage::Tile, &name, &triangle_layout(dimension, expected.len()))?;
+            if corners != *expected.as_flattened() {
+                return Err(self.damaged(&name, &format!("not the triangles of the {dimension} directions")));
+            }
+            Ok(expected)
         };
-        Ok([read("view_triangles")?, read("light_triangles")?])
+        Ok([read("view", &views)?, read("light", &lights)?])
     }
 
     /// Writes which measured texel each tile texel is, [y, x, 2].
     pub fn write_tile(&self, tile: &Tile) -> Result<()> {
         let coordinates: Vec<u32> = tile.source.iter().flatten().copied().collect();
-        let layout = Layout::small::<u32>(&["y", "x", "row_column"], &[tile.size.height, tile.size.width, 2]);
-        self.store.write("tile_source", &layout, &coordinates)
+        self.store.write("tile_source", &tile_layout(tile.size), &coordinates)
     }
 
     /// The tile.
     pub fn tile(&self) -> Result<Tile> {
-        let report: Map<String, Value> = self.report(Stage::Tile)?;
-        let wraps = report.get("wraps").and_then(Value::as_bool).unwrap_or(false);
-        let (shape, coordinates) = self.store.read::<u32>("tile_source", &[0, 0, 2])?;
+        let report = self.tile_report()?;
+        let coordinates = self.read::<u32>(Stage::Tile, "tile_source", &tile_layout(report.size()))?;
         let source: Vec<[u32; 2]> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
-        let plane = report.get("measurement_size").and_then(Value::as_array);
-        let side = |axis: usize| plane.and_then(|plane| plane.get(axis)?.as_u64()).unwrap_or(0);
-        let within = |[row, column]: &[u32; 2]| u64::from(*row) < side(0) && u64::from(*column) < side(1);
-        if source.is_empty() || !source.iter().all(within) {
-            return Err(
-                self.damaged("tile_source", "a source lies outside the measurement, or there is none")
-            );
+        self.expect_measured("tile_source", &source, &report)?;
+        Ok(Tile { size: report.size(), source, wraps: report.wraps })
+    }
+
+    /// Checks that texels lie in the measurement.
+    fn expect_measured(&self, array: &str, source: &[[u32; 2]], report: &TileReport) -> Result<()> {
+        let [rows, columns] = report.measurement_size;
+        let beyond = |[row, column]: &&[u32; 2]| *row as usize >= rows || *column as usize >= columns;
+        match source.iter().find(beyond) {
+            None => Ok(()),
+            Some([row, column]) => Err(self.damaged(
+                array,
+                &format!("row {row}, column {column} lie outside the measurement of {columns}x{rows}"),
+            )),
         }
-        Ok(Tile { size: Size::new(shape[0], shape[1]), source, wraps })
     }
 
     /// Writes what clusters are.
     pub fn write_clusters(&self, clusters: &Clusters) -> Result<()> {
         let count = clusters.sources.len();
-        write_index(&self.store, clusters.size, &clusters.index, count)?;
+        let layout = index_layout(clusters.size, count);
+        if count <= NARROW {
+            let narrow: Vec<u8> = clusters.index.iter().map(|&cluster| cluster as u8).collect();
+            self.store.write("index", &layout, &narrow)?;
+        } else {
+            self.store.write("index", &layout, &clusters.index)?;
+        }
         let [views, lights] = clusters.brdf;
-        let layout = Layout::small::<u8>(&["cluster", "view", "light"], &[count, views, lights]);
-        self.store.write("centres", &layout, &clusters.centres)?;
-        self.write_representatives(&clusters.representatives, &clusters.sources)?;
-        self.write_distance(count, &clusters.distance)
+        let brdf = [count, views, lights];
+        self.store.write("centres", &centres_layout(brdf), &clusters.centres)?;
+        let Representatives { channels, samples, .. } = &clusters.representatives;
+        let layout = representatives_layout(brdf, channels, samples.sample_type());
+        match samples {
+            Samples::U8(list) => self.store.write("representatives", &layout, list),
+            Samples::U16(list) => self.store.write("representatives", &layout, list),
+            Samples::F16(list) => self.store.write("representatives", &layout, list),
+            Samples::F32(list) => self.store.write("representatives", &layout, list),
+        }?;
+        let sources: Vec<u32> = clusters.sources.iter().flatten().copied().collect();
+        self.store.write("representative_texel", &texel_layout(count), &sources)?;
+        self.store.write("distance", &distance_layout(count), &clusters.distance)
     }
 
     /// What clusters are.
     pub fn read_clusters(&self) -> Result<Clusters> {
-        let count = self.clusters()?;
         let [views, lights] = self.directions()?;
-        let brdf = [views.len(), lights.len()];
-        let (_, sources) = self.store.read::<u32>("representative_texel", &[count, 2])?;
         Ok(Clusters {
-            size: self.tile()?.size,
+            size: self.tile_report()?.size(),
             index: self.index()?,
-            brdf,
+            brdf: [views.len(), lights.len()],
             centres: self.centres()?,
             representatives: self.representatives()?,
-            sources: sources.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
+            sources: self.representative_texels()?,
             distance: self.distance()?,
         })
     }
 
+    /// Row and column in the measurement of each representative.
+    pub fn representative_texels(&self) -> Result<Vec<[u32; 2]>> {
+        let layout = texel_layout(self.clusters()?);
+        let sources = self.read::<u32>(Stage::Cluster, "representative_texel", &layout)?;
+        let sources: Vec<[u32; 2]> = sources.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+        self.expect_measured("representative_texel", &sources, &self.tile_report()?)?;
+        Ok(sources)
+    }
+
     /// The cluster of each tile texel.
     pub fn index(&self) -> Result<Vec<u16>> {
-        let Size { height, width } = self.tile()?.size;
-        let wide = *self.store.open_array("index")?.data_type() == u16::data_type();
-        let index = if wide {
-            self.store.read::<u16>("index", &[height, width])?.1
-        } else {
-            self.store.read::<u8>("index", &[height, width])?.1.into_iter().map(u16::from).collect()
-        };
         let clusters = self.clusters()?;
+        let layout = index_layout(self.tile_report()?.size(), clusters);
+        let index = if clusters > NARROW {
+            self.read::<u16>(Stage::Cluster, "index", &layout)?
+        } else {
+            self.read::<u8>(Stage::Cluster, "index", &layout)?.into_iter().map(u16::from).collect()
+        };
         match index.iter().find(|&&cluster| usize::from(cluster) >= clusters) {
             None => Ok(index),
             Some(cluster) => Err(self.damaged("index", &format!("cluster {cluster} of {clusters}"))),
@@ -340,9 +602,15 @@ impl Model {
     }
 
     /// Number of clusters.
-    fn clusters(&self) -> Result<usize> {
-        let report: Map<String, Value> = self.report(Stage::Cluster)?;
-        Ok(report.get("clusters").and_then(Value::as_u64).unwrap_or(0) as usize)
+    pub fn clusters(&self) -> Result<usize> {
+        let ClusterFacts { clusters } = self.report(Stage::Cluster)?;
+        if (1..=MOST_CLUSTERS).contains(&clusters) {
+            return Ok(clusters);
+        }
+        Err(Error::input(format!(
+            "{}: report of cluster: clusters: got {clusters}, expected 1 to {MOST_CLUSTERS}",
+            self.path().display()
+        )))
     }
 
     fn damaged(&self, array: &str, what: &str) -> Error {
@@ -350,82 +618,76 @@ impl Model {
             .hint("delete this array's folder and run the command that made it again")
     }
 
-    /// Writes representatives [cluster, view, light, channel] and where each was measured.
-    fn write_representatives(&self, representatives: &Representatives, texels: &[[u32; 2]]) -> Result<()> {
-        let names = ["cluster", "view", "light", "channel"];
-        let shape = &representatives.shape;
-        let channels = &representatives.channels;
-        self.store.write_samples("representatives", &names, shape, channels, &representatives.samples)?;
-        let layout = Layout::small::<u32>(&["cluster", "row_column"], &[texels.len(), 2]);
-        self.store.write(
-            "representative_texel",
-            &layout,
-            &texels.iter().flatten().copied().collect::<Vec<_>>(),
-        )
-    }
-
     /// The measured colour BRDFs that stand for the clusters.
     pub fn representatives(&self) -> Result<Representatives> {
         self.representatives_of(0..self.clusters()?)
     }
 
+    fn representatives_layout(&self) -> Result<Layout<'static>> {
+        let [views, lights] = self.directions()?.map(|list| list.len());
+        let (channels, samples) = self.values()?;
+        Ok(representatives_layout([self.clusters()?, views, lights], &channels, samples))
+    }
+
     /// Ranges of clusters whose representatives are decoded together: at most 16 MiB, unless one is larger.
     pub fn representative_chunks(&self) -> Result<Vec<Range<usize>>> {
         let clusters = self.clusters()?;
-        let rows = self.store.chunk_rows("representatives")?;
+        let rows = self.representatives_layout()?.chunk[0] as usize;
         Ok((0..clusters).step_by(rows).map(|first| first..clusters.min(first + rows)).collect())
     }
 
     /// The measured colour BRDFs that stand for some of the clusters.
     pub fn representatives_of(&self, clusters: Range<usize>) -> Result<Representatives> {
-        let [views, lights] = self.directions()?;
-        let (found, channels, samples) =
-            self.store.read_samples_of("representatives", clusters.start as u64..clusters.end as u64)?;
-        let expected = [self.clusters()?, views.len(), lights.len(), channels.len()];
-        if found != expected || samples.is_empty() {
-            let found = format!("got shape {found:?}, expected {expected:?} to fit the model");
-            return Err(self.damaged("representatives", &found));
-        }
-        let report: Map<String, Value> = self.report(Stage::Tile)?;
-        let transfer = report.get("transfer").cloned().unwrap_or_default();
-        let transfer: Transfer = serde_json::from_value(transfer)
-            .map_err(|error| Error::input(format!("{}: transfer: {error}", self.path().display())))?;
-        let shape = [clusters.len(), views.len(), lights.len(), channels.len()];
-        Ok(Representatives { shape, channels, samples, transfer })
-    }
-
-    /// Writes D of (26), [cluster, cluster], L* units.
-    fn write_distance(&self, clusters: usize, distance: &[f32]) -> Result<()> {
-        let mut layout = Layout::small::<f32>(&["cluster", "cluster_other"], &[clusters, clusters]);
-        layout
-            .attributes
-            .insert("units".to_owned(), json!("L*, summed over directions with weight cos(theta_v)"));
-        self.store.write("distance", &layout, distance)
+        let layout = self.representatives_layout()?;
+        let array = self.open_array(Stage::Cluster, "representatives", &layout)?;
+        let [_, views, lights, channels] = layout.shape[..] else {
+            return Err(Error::internal("representatives have four dimensions"));
+        };
+        let samples = self.store.read_samples(&array, clusters.start as u64..clusters.end as u64)?;
+        let shape = [clusters.len(), views as usize, lights as usize, channels as usize];
+        let transfer = self.tile_report()?.transfer;
+        Ok(Representatives { shape, channels: self.values()?.0, samples, transfer })
     }
 
     /// D of (26), row by row.
+    ///
+    /// # Errors
+    /// Where it is no distance: finite, at least 0, 0 from itself, the same both ways.
     pub fn distance(&self) -> Result<Vec<f32>> {
         let clusters = self.clusters()?;
-        let (_, distance) = self.store.read::<f32>("distance", &[clusters, clusters])?;
-        if !distance.iter().all(|d| d.is_finite() && *d >= 0.0) {
-            return Err(self.damaged("distance", "expected finite numbers >= 0"));
+        let distance = self.read::<f32>(Stage::Cluster, "distance", &distance_layout(clusters))?;
+        let wrong = (0..clusters).find_map(|row| {
+            let wrong = |&column: &usize| {
+                let (there, back) = (distance[row * clusters + column], distance[column * clusters + row]);
+                !there.is_finite() || there < 0.0 || there != back || (row == column && there != 0.0)
+            };
+            (0..clusters).find(wrong).map(|column| (row, column, distance[row * clusters + column]))
+        });
+        match wrong {
+            None => Ok(distance),
+            Some((row, column, found)) => Err(self.damaged(
+                "distance",
+                &format!(
+                    "from {row} to {column} got {found}, expected finite numbers >= 0, the same both ways, 0 on the diagonal"
+                ),
+            )),
         }
-        Ok(distance)
     }
 
     /// Writes the normal map [y, x, 3], unit vectors.
     pub fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
-        write_normals(&self.store, size, normals)
+        self.store.write("normals", &normals_layout(size), normals.as_flattened())
     }
 
     /// The normal map.
     pub fn normals(&self) -> Result<Vec<[f32; 3]>> {
-        let Size { height, width } = self.tile()?.size;
-        let (_, values) = self.store.read::<f32>("normals", &[height, width, 3])?;
-        match values.iter().position(|value| !value.is_finite()) {
-            None => Ok(values.chunks_exact(3).map(|n| [n[0], n[1], n[2]]).collect()),
+        let layout = normals_layout(self.tile_report()?.size());
+        let values = self.read::<f32>(Stage::Normals, "normals", &layout)?;
+        let normals = values.as_chunks::<3>().0;
+        match normals.iter().position(|normal| !is_unit(normal)) {
+            None => Ok(normals.to_vec()),
             Some(at) => {
-                Err(self.damaged("normals", &format!("texel {} has a component {}", at / 3, values[at])))
+                Err(self.damaged("normals", &format!("texel {at} has {:?}, no unit vector", normals[at])))
             }
         }
     }
@@ -443,19 +705,89 @@ impl Model {
     /// How the exemplar looks.
     pub fn appearance(&self) -> Result<Appearance> {
         let report: AppearanceReport = self.report(Stage::Appearance)?;
-        appearance::read(&self.store, &report, self.tile()?.size, self.clusters()?)
+        let tile = self.tile_report()?;
+        for (name, layout) in appearance::arrays(&report, self.clusters()?) {
+            self.open_array(Stage::Appearance, &name, &layout)?;
+        }
+        appearance::read(&self.store, &report, tile.size(), tile.wraps, self.clusters()?)
     }
 
     /// L* codes of the clusters' centres, [cluster, view, light].
     pub fn centres(&self) -> Result<Vec<u8>> {
-        let [views, lights] = self.directions()?;
-        Ok(self.store.read::<u8>("centres", &[self.clusters()?, views.len(), lights.len()])?.1)
+        let [views, lights] = self.directions()?.map(|list| list.len());
+        self.read::<u8>(Stage::Cluster, "centres", &centres_layout([self.clusters()?, views, lights]))
     }
 
     /// The random field model.
     pub fn surface(&self) -> Result<Surface> {
-        field::read(&self.store, &self.report(Stage::Fit)?)
+        let entry = self.done(Stage::Fit)?;
+        let report: FieldReport = self.typed(Stage::Fit, &entry.report)?;
+        report.check(&entry.recipe).map_err(|what| {
+            Error::input(format!("{}: report of fit: {what}", self.path().display()))
+                .hint("make the model anew, under another name")
+        })?;
+        for (name, layout) in field::arrays(&report) {
+            self.open_array(Stage::Fit, &name, &layout)?;
+        }
+        field::read(&self.store, &report)
     }
+}
+
+/// Whether a vector is a unit vector, as far as f32 goes.
+pub(crate) fn is_unit(normal: &[f32; 3]) -> bool {
+    let length = normal.iter().map(|value| value * value).sum::<f32>().sqrt();
+    (length - 1.0).abs() <= UNIT_TOLERANCE
+}
+
+/// Clusters that a narrow index, of u8, can tell apart.
+pub(crate) const NARROW: usize = 256;
+
+fn tile_layout(size: Size) -> Layout<'static> {
+    Layout::small::<u32>(&["y", "x", "row_column"], &[size.height, size.width, 2])
+}
+
+fn triangle_layout(dimension: &str, count: usize) -> Layout<'static> {
+    // A name for each list: other programs take one length for one name.
+    let names: &[&str] =
+        if dimension == "view" { &["view_triangle", "corner"] } else { &["light_triangle", "corner"] };
+    Layout::small::<u16>(names, &[count, 3])
+}
+
+fn index_layout(size: Size, clusters: usize) -> Layout<'static> {
+    let shape = [size.height, size.width];
+    if clusters <= NARROW {
+        Layout::small::<u8>(&["y", "x"], &shape)
+    } else {
+        Layout::small::<u16>(&["y", "x"], &shape)
+    }
+}
+
+fn centres_layout(shape: [usize; 3]) -> Layout<'static> {
+    Layout::small::<u8>(&["cluster", "view", "light"], &shape)
+}
+
+fn representatives_layout(
+    [clusters, views, lights]: [usize; 3],
+    channels: &[String],
+    samples: SampleType,
+) -> Layout<'static> {
+    let names = &["cluster", "view", "light", "channel"];
+    let shape = [clusters, views, lights, channels.len()];
+    Layout::small_of(data_type_of(samples), samples.bytes(), names, &shape).with("channels", channels)
+}
+
+fn texel_layout(clusters: usize) -> Layout<'static> {
+    Layout::small::<u32>(&["cluster", "row_column"], &[clusters, 2])
+}
+
+fn distance_layout(clusters: usize) -> Layout<'static> {
+    Layout::small::<f32>(&["cluster", "cluster_other"], &[clusters, clusters])
+        .with("units", "L*, summed over directions with weight cos(theta_v)")
+}
+
+fn normals_layout(size: Size) -> Layout<'static> {
+    Layout::small::<f32>(&["y", "x", "xyz"], &[size.height, size.width, 3])
+        .with("frame", "x right, y up, z out of the surface")
 }
 
 /// Everything that clusters are in a model.
@@ -514,22 +846,4 @@ impl Representatives {
     pub fn decoder(&self) -> Result<Decoder> {
         Decoder::new(self.transfer, self.samples.sample_type(), &self.channels)
     }
-}
-
-/// Writes an index [y, x] as u8 or u16 by the number of clusters.
-fn write_index(store: &Store, size: Size, index: &[u16], clusters: usize) -> Result<()> {
-    let shape = [size.height, size.width];
-    if clusters <= 256 {
-        let narrow: Vec<u8> = index.iter().map(|&cluster| cluster as u8).collect();
-        store.write("index", &Layout::small::<u8>(&["y", "x"], &shape), &narrow)
-    } else {
-        store.write("index", &Layout::small::<u16>(&["y", "x"], &shape), index)
-    }
-}
-
-/// Writes unit vectors [y, x, 3] in the sample frame.
-fn write_normals(store: &Store, size: Size, normals: &[[f32; 3]]) -> Result<()> {
-    let mut layout = Layout::small::<f32>(&["y", "x", "xyz"], &[size.height, size.width, 3]);
-    layout.attributes.insert("frame".to_owned(), json!("x right, y up, z out of the surface"));
-    store.write("normals", &layout, &normals.iter().flatten().copied().collect::<Vec<_>>())
 }

@@ -114,7 +114,7 @@ impl Passes {
     /// # Errors
     /// [`crate::Kind::Recipe`] where another recipe's lie there.
     pub fn create(path: &Path, recipe: &Value, context: &Context<'_>) -> Result<Self> {
-        let store = Store::at(path);
+        let mut store = Store::at(path);
         let lock = store.begin_by_recipe(KIND, recipe, json!({}), context)?;
         Ok(Self { store, _lock: lock })
     }

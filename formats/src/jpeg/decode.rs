@@ -1,11 +1,15 @@
 //! Samples of a JPEG.
 
+use std::borrow::Cow;
+
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
+use super::frame::Arrangement;
+use super::interleave::interleaved;
 use super::structure;
 use crate::{Error, Limits, Result};
 
@@ -28,12 +32,24 @@ pub struct Image {
 /// # Errors
 ///
 /// - [`ErrorKind::Malformed`](crate::ErrorKind::Malformed): not a JPEG; cut anywhere; scans, restart markers or
-///   tables missing; bytes other than zeros after the end; data that do not decode.
+///   tables missing; data that do not decode.
 /// - [`ErrorKind::Unsupported`](crate::ErrorKind::Unsupported): arithmetic coding, lossless or hierarchical
 ///   modes, other than 8 bits, other than 1 or 3 components, unusual sampling factors.
 /// - [`ErrorKind::Limit`](crate::ErrorKind::Limit): more pixels or scans than `limits` allows.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
-    let header = structure::walk(bytes, limits)?;
+    let structure::Walked { header, arrangement, length } = structure::walk(bytes, limits)?;
+    let picture = bytes.get(..length).unwrap_or(bytes);
+    let bytes: Cow<'_, [u8]> = match arrangement {
+        Arrangement::Ordinary => Cow::Borrowed(picture),
+        Arrangement::OneComponent(at) => {
+            let mut plain = picture.to_vec();
+            if let Some(factors) = plain.get_mut(at) {
+                *factors = 0x11;
+            }
+            Cow::Owned(plain)
+        }
+        Arrangement::ScatteredScans(grid) => Cow::Owned(interleaved(picture, &grid)?),
+    };
     let colours = if header.channels == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
     let options = DecoderOptions::default()
         .set_strict_mode(true)
@@ -41,7 +57,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         .set_max_height(usize::from(u16::MAX))
         .jpeg_set_max_scans(usize::try_from(limits.max_scans_per_image).unwrap_or(usize::MAX))
         .jpeg_set_out_colorspace(colours);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_ref()), options);
     let samples = decoder.decode().map_err(|e| undecodable(&e))?;
 
     let pixels = u64::from(header.width).saturating_mul(u64::from(header.height));

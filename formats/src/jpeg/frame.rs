@@ -6,18 +6,89 @@ use super::progress::{Band, Progress};
 use crate::reader::Reader;
 use crate::{Error, ErrorKind, Limits, Result};
 
+/// Blocks that one component may have in a coded unit together with others (T.81, B.2.3).
+const MAX_BLOCKS_PER_UNIT: u64 = 10;
+
+/// Sampling factors: blocks of a component in a coded unit, side by side and below each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Sampling {
+    pub(super) horizontal: u8,
+    pub(super) vertical: u8,
+}
+
 #[derive(Debug)]
 struct Component {
     id: u8,
-    horizontal: u8,
-    vertical: u8,
+    sampling: Sampling,
+    /// Number of its quantisation table.
+    quantisation: u8,
     progress: Progress,
 }
 
 impl Component {
     fn blocks_per_mcu(&self) -> u64 {
-        u64::from(self.horizontal).saturating_mul(u64::from(self.vertical))
+        u64::from(self.sampling.horizontal).saturating_mul(u64::from(self.sampling.vertical))
     }
+}
+
+/// Components and coded units of a frame.
+#[derive(Debug)]
+pub(super) struct Grid {
+    pub(super) width: u16,
+    pub(super) height: u16,
+    /// Number and sampling of each component.
+    pub(super) components: Vec<(u8, Sampling)>,
+    /// Numbers of their quantisation tables.
+    pub(super) quantisation: Vec<u8>,
+    /// The largest factors that divide those of all components: without them the picture is the same.
+    pub(super) common: Sampling,
+    most: Sampling,
+}
+
+impl Grid {
+    /// Blocks of a component that are not wholly beyond the picture.
+    pub(super) fn blocks(&self, sampling: Sampling) -> (usize, usize) {
+        let blocks = |length: u16, factor: u8, most: u8| {
+            let unit = usize::from(most.max(1)).saturating_mul(8);
+            usize::from(length).saturating_mul(usize::from(factor)).div_ceil(unit)
+        };
+        (
+            blocks(self.width, sampling.horizontal, self.most.horizontal),
+            blocks(self.height, sampling.vertical, self.most.vertical),
+        )
+    }
+
+    /// Coded units side by side and below each other.
+    pub(super) fn units(&self) -> (usize, usize) {
+        self.blocks(Sampling { horizontal: 1, vertical: 1 })
+    }
+
+    /// The same picture without the common factors, so that its units are smaller.
+    pub(super) fn reduced(&self) -> Grid {
+        let reduced = |of: Sampling| Sampling {
+            horizontal: of.horizontal.checked_div(self.common.horizontal).unwrap_or(1),
+            vertical: of.vertical.checked_div(self.common.vertical).unwrap_or(1),
+        };
+        Grid {
+            width: self.width,
+            height: self.height,
+            components: self.components.iter().map(|&(id, sampling)| (id, reduced(sampling))).collect(),
+            quantisation: self.quantisation.clone(),
+            common: Sampling { horizontal: 1, vertical: 1 },
+            most: reduced(self.most),
+        }
+    }
+}
+
+/// What a decoder must be handed instead of the file.
+#[derive(Debug)]
+pub(super) enum Arrangement {
+    /// The file as it is.
+    Ordinary,
+    /// The file with the sampling factors at this byte set to 1: those of a single component mean nothing.
+    OneComponent(usize),
+    /// The file with its scans put together.
+    ScatteredScans(Grid),
 }
 
 /// The frame header and what its scans have sent so far.
@@ -28,6 +99,9 @@ pub(super) struct Frame {
     /// Largest sampling factors of all components.
     horizontal_max: u8,
     vertical_max: u8,
+    /// Where the sampling factors of the first component stand.
+    sampling_at: usize,
+    scans: usize,
 }
 
 impl Frame {
@@ -60,13 +134,12 @@ impl Frame {
         }
         let mut components = Vec::new();
         for _ in 0..channels {
-            let component = Component {
-                id: fields.u8().map_err(relative)?,
-                progress: Progress::new(),
-                ..sampling(fields.u8().map_err(relative)?)
-            };
-            // The number of the quantisation table; the decoder checks that it exists.
-            fields.u8().map_err(relative)?;
+            let id = fields.u8().map_err(relative)?;
+            let factors = fields.u8().map_err(relative)?;
+            let sampling = Sampling { horizontal: factors >> 4, vertical: factors & 15 };
+            // The decoder checks that the quantisation table exists.
+            let quantisation = fields.u8().map_err(relative)?;
+            let component = Component { id, sampling, quantisation, progress: Progress::new() };
             if components.iter().any(|c: &Component| c.id == component.id) {
                 return Err(Error::malformed(format!("two components {}", component.id), "one").at(at));
             }
@@ -75,11 +148,35 @@ impl Frame {
         if !fields.rest().is_empty() {
             return Err(Error::malformed("bytes after the last component", "none").at(at));
         }
-        require_known_sampling(&components).map_err(relative)?;
-        let header = Header { width, height, channels, progressive };
-        let horizontal_max = components.iter().map(|c| c.horizontal).max().unwrap_or(1);
-        let vertical_max = components.iter().map(|c| c.vertical).max().unwrap_or(1);
-        Ok(Frame { header, components, horizontal_max, vertical_max })
+        require_known_sampling(&components, progressive).map_err(relative)?;
+        let header = Header { width, height, channels, progressive, orientation: 1 };
+        let horizontal_max = components.iter().map(|c| c.sampling.horizontal).max().unwrap_or(1);
+        let vertical_max = components.iter().map(|c| c.sampling.vertical).max().unwrap_or(1);
+        // Behind the segment's length, precision, size, number of components, and the first one's own number.
+        let sampling_at = at.saturating_add(9);
+        Ok(Frame { header, components, horizontal_max, vertical_max, sampling_at, scans: 0 })
+    }
+
+    /// What a decoder is to be handed, once all scans have been read.
+    pub(super) fn arrangement(&self) -> Arrangement {
+        if let [only] = self.components.as_slice() {
+            let plain = only.sampling == Sampling { horizontal: 1, vertical: 1 };
+            return if plain { Arrangement::Ordinary } else { Arrangement::OneComponent(self.sampling_at) };
+        }
+        // The decoder knows factors that are powers of two.
+        let odd = self.components.iter().any(|c| [c.sampling.horizontal, c.sampling.vertical].contains(&3));
+        if self.header.progressive || self.scans == 1 && !odd {
+            return Arrangement::Ordinary;
+        }
+        let side = |length: u32| u16::try_from(length).unwrap_or(u16::MAX);
+        Arrangement::ScatteredScans(Grid {
+            width: side(self.header.width),
+            height: side(self.header.height),
+            components: self.components.iter().map(|c| (c.id, c.sampling)).collect(),
+            quantisation: self.components.iter().map(|c| c.quantisation).collect(),
+            common: common_factors(&self.components),
+            most: Sampling { horizontal: self.horizontal_max, vertical: self.vertical_max },
+        })
     }
 
     /// Reads a scan header and steps over the scan's data. `restart_interval` counts coded units; 0 is none.
@@ -107,6 +204,8 @@ impl Frame {
         }
         let band = Band { first, last, high: approximation >> 4, low: approximation & 15 };
         self.require_legal_band(&selected, band).map_err(relative)?;
+        self.require_legal_unit(&selected).map_err(relative)?;
+        self.scans = self.scans.saturating_add(1);
         for &position in &selected {
             let Some(component) = self.components.get_mut(position) else { continue };
             let sent = component.progress.send(band);
@@ -171,6 +270,22 @@ impl Frame {
         ))
     }
 
+    /// Components of a scan stand in the order of the frame, and their coded unit has a largest size (T.81, B.2.3).
+    fn require_legal_unit(&self, selected: &[usize]) -> Result<()> {
+        if !selected.is_sorted() {
+            return Err(Error::malformed("a scan of components in another order", "the order of the frame"));
+        }
+        let components = selected.iter().filter_map(|&position| self.components.get(position));
+        let blocks = components.map(Component::blocks_per_mcu).fold(0, u64::saturating_add);
+        if selected.len() > 1 && blocks > MAX_BLOCKS_PER_UNIT {
+            return Err(Error::malformed(
+                format!("a scan whose coded unit has {blocks} blocks"),
+                "at most 10",
+            ));
+        }
+        Ok(())
+    }
+
     /// Minimum coded units and blocks in a scan of the `selected` components (T.81, A.2).
     fn scan_size(&self, selected: &[usize]) -> (u64, u64) {
         let width = u64::from(self.header.width);
@@ -179,9 +294,12 @@ impl Frame {
         let components = selected.iter().filter_map(|&position| self.components.get(position));
         if let &[only] = selected {
             let Some(component) = self.components.get(only) else { return (0, 0) };
-            let columns =
-                width.saturating_mul(u64::from(component.horizontal)).div_ceil(h_max.saturating_mul(8));
-            let rows = height.saturating_mul(u64::from(component.vertical)).div_ceil(v_max.saturating_mul(8));
+            let columns = width
+                .saturating_mul(u64::from(component.sampling.horizontal))
+                .div_ceil(h_max.saturating_mul(8));
+            let rows = height
+                .saturating_mul(u64::from(component.sampling.vertical))
+                .div_ceil(v_max.saturating_mul(8));
             let blocks = columns.saturating_mul(rows);
             return (blocks, blocks);
         }
@@ -206,26 +324,42 @@ impl Frame {
     }
 }
 
-/// A component with the sampling factors in `byte` and nothing else known.
-fn sampling(byte: u8) -> Component {
-    Component { id: 0, horizontal: byte >> 4, vertical: byte & 15, progress: Progress::new() }
+/// The largest factors that divide those of all components.
+fn common_factors(components: &[Component]) -> Sampling {
+    let common = |of: fn(&Component) -> u8| {
+        let divides = |factor: &u8| components.iter().all(|c| of(c).checked_rem(*factor) == Some(0));
+        (1..=4).rev().find(divides).unwrap_or(1)
+    };
+    Sampling { horizontal: common(|c| c.sampling.horizontal), vertical: common(|c| c.sampling.vertical) }
 }
 
-/// Grey, 4:4:4, 4:2:2, 4:4:0 and 4:2:0 as everybody writes them. Stranger samplings are where decoders differ.
-fn require_known_sampling(components: &[Component]) -> Result<()> {
-    let known = components.iter().enumerate().all(|(i, c)| {
-        let most = if i == 0 && components.len() > 1 { 2 } else { 1 };
-        (1..=most).contains(&c.horizontal) && (1..=most).contains(&c.vertical)
-    });
-    if known {
+/// One component, or three the first of which has the most blocks, 1, 2 or 4 for each of another's. So are 4:4:4, 4:2:2,
+/// 4:4:0, 4:2:0, 4:1:1 and 4:1:0. Stranger samplings are where decoders differ.
+fn require_known_sampling(components: &[Component], progressive: bool) -> Result<()> {
+    let both = |c: &Component| [c.sampling.horizontal, c.sampling.vertical];
+    // Three blocks of each component are three times one; of a progressive file that is left to be said.
+    let most_blocks = |factor: &u8| (1..=4).contains(factor) && !(progressive && *factor == 3);
+    let legal = components.iter().all(|c| components.len() == 1 || both(c).iter().all(most_blocks))
+        && components.iter().all(|c| both(c).iter().all(|factor| (1..=4).contains(factor)));
+    let common = common_factors(components);
+    let most = components.first().map_or([1, 1], both);
+    let known = components.len() == 1
+        || components.iter().all(|c| {
+            let ratio = |(of, most): (u8, u8)| most.checked_rem(of) == Some(0);
+            both(c).into_iter().zip(most).all(ratio)
+        }) && most
+            .into_iter()
+            .zip([common.horizontal, common.vertical])
+            .all(|(most, common)| matches!(most.checked_div(common), Some(1 | 2 | 4)));
+    if legal && known {
         return Ok(());
     }
     let factors: Vec<String> =
-        components.iter().map(|c| format!("{}x{}", c.horizontal, c.vertical)).collect();
+        components.iter().map(|c| format!("{}x{}", c.sampling.horizontal, c.sampling.vertical)).collect();
     let found = format!("sampling factors {}", factors.join(", "));
     Err(Error::new(
         ErrorKind::Unsupported,
         found,
-        "1x1 or 2x1 or 1x2 or 2x2 for the first of three components, else 1x1",
+        "1 to 4, and 1, 2 or 4 times as many of the first component as of each other; re-encode the picture",
     ))
 }

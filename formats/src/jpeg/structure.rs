@@ -1,21 +1,33 @@
 //! The walk over the markers of a JPEG (ITU-T T.81, annex B).
 
 use super::Header;
-use super::frame::Frame;
+use super::frame::{Arrangement, Frame};
 use super::marker;
+use crate::picture::orientation;
 use crate::reader::Reader;
 use crate::{Error, ErrorKind, Limits, Result};
+
+/// A file that is whole.
+pub(super) struct Walked {
+    pub(super) header: Header,
+    pub(super) arrangement: Arrangement,
+    /// Bytes up to the end marker, with it.
+    pub(super) length: usize,
+}
 
 /// Reads as far as the frame header.
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header> {
     let mut reader = Reader::new(bytes);
     start(&mut reader)?;
+    let mut orientation = 1;
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
             code @ (marker::SOF0 | marker::SOF1 | marker::SOF2) => {
-                return Ok(Frame::read(&mut reader, code == marker::SOF2, limits)?.header);
+                let header = Frame::read(&mut reader, code == marker::SOF2, limits)?.header;
+                return Ok(Header { orientation, ..header });
             }
+            marker::APP1 => orientation = read_orientation(&mut reader, orientation)?,
             marker::EOI | marker::SOS => {
                 return Err(Error::malformed("the end of the headers", "a frame header (SOF)").at(at));
             }
@@ -24,13 +36,15 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header> {
     }
 }
 
-/// Reads the whole file, up to its EOI marker and the zero bytes that may follow it.
-pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Header> {
+/// Reads the whole file, up to its EOI marker. What follows it (previews, films, notes of the camera) is not the
+/// picture's and is not looked at.
+pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut reader = Reader::new(bytes);
     start(&mut reader)?;
     let mut frame: Option<Frame> = None;
     let mut restart_interval = 0;
     let mut scans = 0u32;
+    let mut orientation = 1;
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
@@ -41,6 +55,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Header> {
                 frame = Some(Frame::read(&mut reader, code == marker::SOF2, limits)?);
             }
             marker::DRI => restart_interval = read_restart_interval(&mut reader)?,
+            marker::APP1 if frame.is_none() => orientation = read_orientation(&mut reader, orientation)?,
             marker::SOS => {
                 scans = scans.saturating_add(1);
                 if scans > limits.max_scans_per_image {
@@ -59,11 +74,11 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Header> {
                     return Err(Error::malformed("the end of the image", "a frame header (SOF)").at(at));
                 };
                 frame.require_complete(at)?;
-                if reader.rest().iter().any(|&byte| byte != 0) {
-                    let found = format!("{} bytes after the end of the image", reader.rest().len());
-                    return Err(Error::malformed(found, "none, or zeros").at(reader.position()));
-                }
-                return Ok(frame.header);
+                return Ok(Walked {
+                    header: Header { orientation, ..frame.header },
+                    arrangement: frame.arrangement(),
+                    length: reader.position(),
+                });
             }
             code => skip(&mut reader, code, at)?,
         }
@@ -94,6 +109,13 @@ fn skip(reader: &mut Reader<'_>, code: u8, at: usize) -> Result<()> {
         }
         _ => Err(Error::malformed(format!("the marker ff{code:02x}"), "a marker that may stand here").at(at)),
     }
+}
+
+/// The orientation in an Exif segment; the first one that is found counts.
+fn read_orientation(reader: &mut Reader<'_>, before: u8) -> Result<u8> {
+    let segment = marker::segment(reader)?;
+    let found = segment.strip_prefix(b"Exif\0\0").map_or(1, orientation::of_exif);
+    Ok(if before == 1 { found } else { before })
 }
 
 fn read_restart_interval(reader: &mut Reader<'_>) -> Result<u64> {

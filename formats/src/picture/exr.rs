@@ -6,7 +6,7 @@
 //! the offset table is damaged.)
 //!
 //! The picture is the data window; the display window is ignored, so that whoever reads a set compares sizes.
-//! Chromaticities and white luminance are not applied. Refused: several parts or layers, deep data, mip maps, subsampled
+//! Chromaticities and white luminance are not applied. Refused: several parts or layers (a single one is the picture), deep data, mip maps, subsampled
 //! channels, HTJ2K.
 //!
 //! Source: "OpenEXR File Layout" of the Academy Software Foundation.
@@ -53,5 +53,7 @@ fn of_header(header: &Header) -> PictureHeader {
         sample_type: header.channels.sample_type(),
         linear: true,
         scanlines_are_columns: false,
+        orientation: 1,
+        layer: header.channels.layer.clone(),
     }
 }

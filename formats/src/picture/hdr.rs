@@ -93,6 +93,9 @@ fn of_header(header: &Header) -> PictureHeader {
         sample_type: SampleType::F32,
         linear: true,
         scanlines_are_columns: header.scanline_axis() == Axis::Y,
+        // The resolution line says where the first pixel lies, and is obeyed.
+        orientation: 1,
+        layer: None,
     }
 }
 

@@ -32,6 +32,8 @@ fn of_image(image: &chunks::ImageHeader) -> PictureHeader {
         sample_type: image.sample_type,
         linear: false,
         scanlines_are_columns: false,
+        orientation: image.orientation,
+        layer: None,
     }
 }
 

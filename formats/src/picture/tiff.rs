@@ -2,8 +2,8 @@
 //!
 //! Read are 8- and 16-bit integers and 16- and 32-bit floats, grey, RGB, or any number of channels without meaning
 //! (named C0, C1, ...), side by side or apart, in strips or tiles, uncompressed or by LZW, deflate or PackBits, with either
-//! predictor. Refused: several pictures in one file, palettes, white-is-zero, CMYK, YCbCr and Lab, turned pictures
-//! (Orientation), JPEG and fax inside a TIFF.
+//! predictor. Refused: several pictures in one file (smaller versions beside one do not matter), palettes, white-is-zero,
+//! CMYK, YCbCr and Lab, JPEG and fax inside a TIFF.
 //!
 //! The layout of the file and the predictors are read here, and crates unpack LZW and deflate. (The crate `tiff`
 //! multiplies what the directory says before it has held it against anything, refuses some valid LZW tiles at the edge
@@ -17,6 +17,7 @@ mod pixels;
 use super::{Picture, PictureHeader};
 use crate::{Limits, Result, SampleType};
 
+use directory::{Directory, tag};
 use layout::Layout;
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
@@ -37,6 +38,11 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
     Ok(Picture { width, height, channels, samples })
 }
 
+/// The orientation that the first directory of a TIFF, or of Exif data, asks for; 1 where it says nothing.
+pub(super) fn orientation(bytes: &[u8]) -> Result<u64> {
+    Directory::first(bytes)?.number(tag::ORIENTATION, Some(1))
+}
+
 fn of_layout(layout: &Layout) -> PictureHeader {
     PictureHeader {
         width: layout.size.width,
@@ -45,5 +51,7 @@ fn of_layout(layout: &Layout) -> PictureHeader {
         sample_type: layout.sample_type,
         linear: matches!(layout.sample_type, SampleType::F16 | SampleType::F32),
         scanlines_are_columns: false,
+        orientation: layout.orientation,
+        layer: None,
     }
 }

@@ -7,12 +7,13 @@ const RANGE_NM: std::ops::RangeInclusive<f64> = 100.0..=100_000.0;
 ///
 /// Read are a number (decimal point or decimal comma), with or without the unit `nm` or `um`, and with or without
 /// a quantity before it: `450`, `450.5`, `450nm`, `0.45um`, and `S0.450,000000nm` or `T.450,000000nm` as spectral
-/// OpenEXR files name emission and reflectance.
+/// OpenEXR files name emission and reflectance. Of a band, `400.00-430.00nm` as some renderers name theirs, it is the middle.
 ///
 /// ```
 /// use btfkit_formats::picture::wavelength_nm;
 /// assert_eq!(wavelength_nm("450nm"), Some(450.0));
 /// assert_eq!(wavelength_nm("S0.450,500000nm"), Some(450.5));
+/// assert_eq!(wavelength_nm("400.00-430.00nm"), Some(415.0));
 /// assert_eq!(wavelength_nm("R"), None);
 /// ```
 pub fn wavelength_nm(name: &str) -> Option<f64> {
@@ -22,13 +23,20 @@ pub fn wavelength_nm(name: &str) -> Option<f64> {
         (_, Some(number)) => (number, 1000.0),
         _ => (bare, 1.0),
     };
-    let number = number.trim().replace(',', ".");
-    // The standard parser takes signs, exponents and "inf" too, which no name of a channel has.
-    if !number.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.') {
-        return None;
-    }
-    let wavelength = number.parse::<f64>().ok()? * nm_per_unit;
-    RANGE_NM.contains(&wavelength).then_some(wavelength)
+    let wavelength = |text: &str| {
+        let number = text.trim().replace(',', ".");
+        // The standard parser takes signs, exponents and "inf" too, which no name of a channel has.
+        let plain = number.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+        number.parse::<f64>().ok().filter(|_| plain).map(|number| number * nm_per_unit)
+    };
+    let middle = match number.split_once('-') {
+        None => wavelength(number)?,
+        Some((from, to)) => {
+            let (from, to) = (wavelength(from)?, wavelength(to)?);
+            Some((from + to) / 2.0).filter(|_| from < to)?
+        }
+    };
+    RANGE_NM.contains(&middle).then_some(middle)
 }
 
 /// What the wavelength is one of (`S0` .. `S3` Stokes components of emission, `T` reflectance; else nothing), and the rest of the name.
@@ -54,6 +62,8 @@ mod tests {
             ("0.45um", 450.0),
             ("S0.450,250000nm", 450.25),
             ("T.700,000000nm", 700.0),
+            ("400.00-430.00nm", 415.0),
+            ("0,4-0,43um", 415.0),
         ] {
             assert_eq!(wavelength_nm(name), Some(expected), "{name}");
         }
@@ -62,7 +72,23 @@ mod tests {
     #[test]
     fn other_names_are_not() {
         for name in [
-            "R", "Y", "", "nm", "C0", "3", "-450", "4e2", "inf", "450.5.5", "450m", "w450", "NaN", "S0.R",
+            "R",
+            "Y",
+            "",
+            "nm",
+            "C0",
+            "3",
+            "-450",
+            "4e2",
+            "inf",
+            "450.5.5",
+            "450m",
+            "w450",
+            "NaN",
+            "430-400nm",
+            "-430nm",
+            "400-nm",
+            "S0.R",
             "S0.",
         ] {
             assert_eq!(wavelength_nm(name), None, "{name}");

@@ -109,13 +109,51 @@ fn arguments_that_cannot_be_encoded_are_refused() {
 }
 
 #[test]
-fn zeros_after_the_end_are_tolerated_and_nothing_else() {
-    let mut bytes = jpeg_of(16, 16, 3, &EncodeOptions::UBO2003);
-    let clean = decode(&bytes, &Limits::default()).unwrap();
-    bytes.extend([0; 100]);
-    assert_eq!(decode(&bytes, &Limits::default()).unwrap(), clean);
-    bytes.push(1);
-    assert_eq!(refusal(&bytes).kind(), ErrorKind::Malformed);
+fn what_follows_the_end_is_not_the_picture() {
+    for options in [EncodeOptions::UBO2003, options(90, false, Chroma::Half)] {
+        let whole = jpeg_of(16, 16, 3, &options);
+        let clean = decode(&whole, &Limits::default()).unwrap();
+        // Zeros, a preview, a film, anything.
+        let preview = jpeg_of(8, 8, 3, &options);
+        for tail in [&[0; 100][..], &preview, b"ftypmp42", &[1]] {
+            let bytes = [&whole, tail].concat();
+            assert_eq!(
+                check(&bytes, &Limits::default()).unwrap(),
+                header(&whole, &Limits::default()).unwrap()
+            );
+            assert_eq!(decode(&bytes, &Limits::default()).unwrap(), clean);
+            // A picture that is cut does not become whole by what follows.
+            for end in [whole.len() - 2, whole.len() - 1, whole.len() / 2] {
+                assert_eq!(refusal(&[&whole[..end], tail].concat()).kind(), ErrorKind::Malformed);
+            }
+        }
+    }
+}
+
+/// A JPEG with Exif data that ask for an orientation.
+fn with_orientation(jpeg: &[u8], orientation: u8, little_endian: bool) -> Vec<u8> {
+    let mut exif = b"\xFF\xE1\0\x22Exif\0\0".to_vec();
+    exif.extend(if little_endian {
+        [&b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"[..], &[orientation, 0, 0, 0], &[0; 4]].concat()
+    } else {
+        [&b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01"[..], &[0, orientation, 0, 0], &[0; 4]].concat()
+    });
+    [&jpeg[..2], &exif, &jpeg[2..]].concat()
+}
+
+#[test]
+fn an_orientation_is_told_and_not_applied() {
+    let plain = jpeg_of(16, 8, 3, &EncodeOptions::UBO2003);
+    let samples = decode(&plain, &Limits::default()).unwrap().samples;
+    assert_eq!(header(&plain, &Limits::default()).unwrap().orientation, 1);
+    for (written, told) in [(1, 1), (3, 3), (6, 6), (8, 8), (0, 1), (9, 1)] {
+        for little_endian in [false, true] {
+            let bytes = with_orientation(&plain, written, little_endian);
+            assert_eq!(header(&bytes, &Limits::default()).unwrap().orientation, told);
+            assert_eq!(check(&bytes, &Limits::default()).unwrap().orientation, told);
+            assert_eq!(decode(&bytes, &Limits::default()).unwrap().samples, samples);
+        }
+    }
 }
 
 #[test]
@@ -185,7 +223,7 @@ fn other_kinds_of_jpeg_are_unsupported() {
     assert_eq!(change(frame - 1, 0xC9).kind(), ErrorKind::Unsupported, "arithmetic coding");
     assert_eq!(change(frame - 1, 0xC3).kind(), ErrorKind::Unsupported, "lossless");
     assert_eq!(change(frame + 2, 12).kind(), ErrorKind::Unsupported, "12 bits");
-    assert_eq!(change(frame + 9, 0x41).kind(), ErrorKind::Unsupported, "4:1:1");
+    assert_eq!(change(frame + 9, 0x31).kind(), ErrorKind::Unsupported, "a third of the chroma");
     assert_eq!(change(frame + 7, 4).kind(), ErrorKind::Unsupported, "four components");
     assert_eq!(change(0, 0).kind(), ErrorKind::Malformed, "no JPEG");
 }

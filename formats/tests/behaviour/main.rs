@@ -15,6 +15,7 @@ mod bonn_writing;
 mod catalogue;
 mod damage;
 mod jpeg;
+mod jpeg_arrangements;
 mod lists;
 mod measured_files;
 mod measured_lists;

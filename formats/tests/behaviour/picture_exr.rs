@@ -83,10 +83,43 @@ fn channels_come_in_a_stable_order() {
 }
 
 #[test]
-fn layers_are_refused() {
-    for names in
-        [vec!["left.R", "left.G", "left.B"], vec!["R", "G", "B", "depth.Z"], vec!["S0.450,0nm", "S1.450,0nm"]]
-    {
+fn a_single_layer_is_the_picture() {
+    for (names, layer, channels) in [
+        (
+            vec!["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"],
+            "ViewLayer.Combined",
+            "R G B",
+        ),
+        (vec!["Background.Y"], "Background", "Y"),
+        (vec!["a.450.5nm", "a.700nm"], "a", "450.5nm 700nm"),
+    ] {
+        let bytes = encode(&exr_picture(3, 3, &names, true), Compression::Zip).unwrap();
+        let header = header(&bytes, &Limits::default()).unwrap();
+        assert_eq!(header.layer.as_deref(), Some(layer));
+        assert_eq!(header.channels.join(" "), channels);
+        assert_eq!(decode(&bytes, &Limits::default()).unwrap().channels.join(" "), channels);
+    }
+}
+
+#[test]
+fn bands_of_renderers_are_wavelengths_and_no_layers() {
+    let names = ["670.00-700.00nm", "400.00-430.00nm", "430.00-460.00nm"];
+    let bytes = encode(&exr_picture(3, 3, &names, true), Compression::None).unwrap();
+    let header = header(&bytes, &Limits::default()).unwrap();
+    assert_eq!(
+        (header.layer, header.channels.join(" ")),
+        (None, "400.00-430.00nm 430.00-460.00nm 670.00-700.00nm".to_owned())
+    );
+}
+
+#[test]
+fn several_layers_are_refused() {
+    for names in [
+        vec!["left.R", "left.G", "right.B"],
+        vec!["R", "G", "B", "depth.Z"],
+        vec!["S0.450,0nm", "S1.450,0nm"],
+        vec!["S1.450,0nm", "S1.500,0nm"],
+    ] {
         let bytes = encode(&exr_picture(3, 3, &names, true), Compression::None).unwrap();
         let error = decode(&bytes, &Limits::default()).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Unsupported);

@@ -1,6 +1,6 @@
 //! PNG: depths, palettes, interlacing, alpha; and what is written.
 
-use btfkit_formats::picture::{Picture, decode, header, png::encode};
+use btfkit_formats::picture::{Picture, check, decode, header, png::encode};
 use btfkit_formats::{ErrorKind, Limits, SampleType, Samples};
 
 use crate::picture_files::{Png, png_chunk};
@@ -100,8 +100,24 @@ fn chunks_out_of_place_are_refused() {
     refused([png_chunk(b"IDAT", b""), png_chunk(b"tEXt", b"a\0b")].concat(), ErrorKind::Malformed, "IDAT");
     let bytes = Png::new(6, 6, 8, 2, false).bytes();
     assert_eq!(read(&[bytes.clone(), vec![0; 9]].concat()), read(&bytes));
-    let error = decode(&[bytes, b"more".to_vec()].concat(), &Limits::default()).unwrap_err();
-    assert!(error.to_string().contains("4 bytes after the end"), "{error}");
+    assert_eq!(
+        read(&[bytes.clone(), b"more".to_vec()].concat()),
+        read(&bytes),
+        "what follows the end is not the picture"
+    );
+}
+
+#[test]
+fn an_orientation_is_told_and_not_applied() {
+    let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0";
+    let plain = Png::new(6, 4, 8, 2, false);
+    let turned = Png { before: png_chunk(b"eXIf", exif), ..Png::new(6, 4, 8, 2, false) };
+    for (png, expected) in [(&plain, 1), (&turned, 6)] {
+        let bytes = png.bytes();
+        assert_eq!(header(&bytes, &Limits::default()).unwrap().orientation, expected);
+        assert_eq!(check(&bytes, &Limits::default()).unwrap().orientation, expected);
+        assert_eq!(read(&bytes), read(&plain.bytes()));
+    }
 }
 
 #[test]

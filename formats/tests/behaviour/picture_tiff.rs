@@ -1,6 +1,6 @@
 //! TIFF: types, byte orders, strips, tiles, planes, channels of no meaning.
 
-use btfkit_formats::picture::{Picture, decode, header};
+use btfkit_formats::picture::{Picture, check, decode, header};
 use btfkit_formats::{ErrorKind, Limits, Samples};
 
 use crate::picture_files::{Tiff, pattern_samples, tiff_by_crate, tiff_samples};
@@ -124,7 +124,6 @@ fn what_is_not_read_is_refused_with_its_reason() {
         (262, vec![5], "photometric interpretation 5"),
         (262, vec![6], "photometric interpretation 6"),
         (266, vec![2], "fill order"),
-        (274, vec![6], "orientation 6"),
         (317, vec![2], "predictor 2"),
         (258, vec![12; 3], "12 bits"),
         (258, vec![8, 8, 16], "values [8, 8, 16]"),
@@ -139,4 +138,113 @@ fn what_is_not_read_is_refused_with_its_reason() {
     doubled.tags.push((256, vec![4]));
     let error = decode(&doubled.bytes(), &Limits::default()).unwrap_err();
     assert!(error.to_string().contains("two entries of tag 256"), "{error}");
+}
+
+#[test]
+fn an_orientation_is_told_and_not_applied() {
+    let good = Tiff::new((4, 4, 3), 8, 1, 4);
+    let samples = tiff_samples(&good, 48, "u8");
+    let good = good.with_strips(&samples, 4, false);
+    for (written, told) in [(0, 1), (1, 1), (6, 6), (8, 8)] {
+        let bytes = good.clone().set(274, &[written]).bytes();
+        assert_eq!(header(&bytes, &Limits::default()).unwrap().orientation, told);
+        assert_eq!(read(&bytes), read(&good.bytes()));
+    }
+    let error = decode(&good.clone().set(274, &[9]).bytes(), &Limits::default()).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Malformed);
+}
+
+/// A directory of a grey picture of `side * side` samples of one value.
+#[derive(Clone)]
+struct Part {
+    side: u32,
+    tags: Vec<(u16, u32)>,
+    /// Reached by the SubIFDs of the first directory, else in the chain.
+    child: bool,
+}
+
+fn part(side: u32, tags: &[(u16, u32)], child: bool) -> Part {
+    Part { side, tags: tags.to_vec(), child }
+}
+
+/// A little-endian TIFF of these directories; the first is in the chain.
+fn file_of(parts: &[Part]) -> Vec<u8> {
+    let mut at = 8u32;
+    let places: Vec<u32> = parts
+        .iter()
+        .map(|part| {
+            let place = at;
+            at += part.side * part.side + 12 * 20 + 6;
+            place
+        })
+        .collect();
+    let offset = |n: usize| places[n] + parts[n].side * parts[n].side;
+    let children: Vec<u32> = (0..parts.len()).filter(|&n| parts[n].child).map(offset).collect();
+    let list_at = at;
+    let mut out = [&b"II*\0"[..], &offset(0).to_le_bytes()].concat();
+    for (n, part) in parts.iter().enumerate() {
+        out.resize(places[n] as usize, 0);
+        out.extend(vec![u8::try_from(part.side).unwrap(); (part.side * part.side) as usize]);
+        let mut tags: Vec<(u16, u32, u32)> =
+            vec![(256, 1, part.side), (257, 1, part.side), (258, 1, 8), (262, 1, 1)];
+        tags.extend([(273, 1, places[n]), (279, 1, part.side * part.side)]);
+        tags.extend(part.tags.iter().map(|&(tag, value)| (tag, 1, value)));
+        match children.as_slice() {
+            [] => {}
+            &[only] if n == 0 => tags.push((330, 1, only)),
+            list if n == 0 => tags.push((330, u32::try_from(list.len()).unwrap(), list_at)),
+            _ => {}
+        }
+        out.extend(u16::try_from(tags.len()).unwrap().to_le_bytes());
+        for (tag, count, value) in tags {
+            out.extend([tag.to_le_bytes(), 4u16.to_le_bytes()].concat());
+            out.extend([count.to_le_bytes(), value.to_le_bytes()].concat());
+        }
+        let next = (n + 1..parts.len()).find(|&later| !part.child && !parts[later].child);
+        out.extend(next.map_or(0, offset).to_le_bytes());
+    }
+    out.resize(list_at as usize, 0);
+    out.extend(children.iter().flat_map(|child| child.to_le_bytes()));
+    out
+}
+
+#[test]
+fn the_picture_is_the_one_that_is_no_smaller_version() {
+    let (full, small, older_small) = (&[][..], &[(254, 1)][..], &[(255, 2)][..]);
+    for (parts, side) in [
+        (vec![part(9, full, false)], 9),
+        (vec![part(9, &[(254, 0)], false), part(3, small, false)], 9),
+        (vec![part(3, small, false), part(9, full, false)], 9),
+        (vec![part(3, older_small, false), part(9, &[(255, 1)], false)], 9),
+        (vec![part(9, &[(254, 2)], false), part(3, &[(254, 3)], false)], 9),
+        // A camera's: a thumbnail, the picture below it, perhaps with a preview.
+        (vec![part(3, small, false), part(9, full, true)], 9),
+        (vec![part(3, small, false), part(5, small, true), part(9, full, true)], 9),
+        // Smaller versions below the picture.
+        (vec![part(9, full, false), part(5, small, true), part(3, small, true)], 9),
+    ] {
+        let bytes = file_of(&parts);
+        assert_eq!(header(&bytes, &Limits::default()).unwrap().width, side);
+        check(&bytes, &Limits::default()).unwrap();
+        assert_eq!(read(&bytes).samples, Samples::U8(vec![9; 81]));
+    }
+    for (parts, words) in [
+        (vec![part(3, small, false)], "only smaller versions"),
+        (vec![part(3, older_small, false)], "only smaller versions"),
+        (vec![part(3, small, false), part(5, small, true)], "only smaller versions"),
+        (vec![part(9, full, false), part(9, full, false)], "2 pictures"),
+        (vec![part(9, &[(254, 2)], false), part(9, &[(254, 2)], false)], "2 pictures"),
+        (vec![part(3, small, false), part(9, full, true), part(7, full, true)], "2 pictures"),
+        (vec![part(9, full, false), part(9, &[(254, 4)], false)], "transparency mask"),
+    ] {
+        let bytes = file_of(&parts);
+        for error in [
+            header(&bytes, &Limits::default()).unwrap_err(),
+            check(&bytes, &Limits::default()).unwrap_err(),
+            decode(&bytes, &Limits::default()).unwrap_err(),
+        ] {
+            assert_eq!(error.kind(), ErrorKind::Unsupported);
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
 }

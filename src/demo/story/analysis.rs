@@ -111,7 +111,7 @@ pub(super) fn clusters(figures: &Figures) -> Section {
             errors.view_theta_deg.map_or("all".to_owned(), |theta| format!("{theta}°")),
             errors.views.to_string(),
             format!("{:.3}", errors.lightness),
-            format!("{:.2}", errors.psnr_db),
+            errors.psnr_text(),
             format!("{:.3}", errors.ciede2000),
         ]
     });

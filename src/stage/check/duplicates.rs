@@ -107,11 +107,21 @@ pub fn check(statistics: &Statistics) -> Check {
             directions: places,
         });
     }
-    let least_percent = 100.0 * least;
-    let detail = format!(
-        "no two images are nearer than {least_percent:.2} %, nearly equal below {:.2} %",
-        100.0 * NEARLY
-    );
+    let (least_percent, nearly) = (100.0 * least, 100.0 * NEARLY);
+    let detail = match (equal.iter().map(Vec::len).sum::<usize>(), near.len()) {
+        (0, 0) => {
+            format!("no two images are nearer than {least_percent:.2} %, nearly equal below {nearly:.2} %")
+        }
+        (0, pairs) => {
+            format!("{pairs} pairs of images of different directions are nearly equal (below {nearly:.2} %)")
+        }
+        (images, 0) => format!("{images} images of different directions are equal"),
+        (images, pairs) => {
+            format!(
+                "{images} images of different directions are equal, {pairs} pairs nearly (below {nearly:.2} %)"
+            )
+        }
+    };
     Check::done(NAME, detail, NEARLY / least.max(1e-9), findings)
 }
 

@@ -5,6 +5,15 @@ use serde_json::{Value, json};
 
 use super::statistics::Statistics;
 
+/// Below this confidence a finding is a suspicion and no fault: a person should look. Evidence of twice its threshold has it.
+pub const SURE: f64 = 0.75;
+
+/// What is shown of an alarm at most: more says no more.
+pub const MOST_ALARM: f64 = 10.0;
+
+/// What is shown of it at most where nothing was found.
+const BELOW_ALARM: f64 = 0.99;
+
 /// How bad a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -82,7 +91,8 @@ pub struct Check {
     pub state: State,
     /// What was measured, or why nothing was.
     pub detail: String,
-    /// The worst value measured as a share of the one that raises the alarm.
+    /// The worst value measured as a share of the one that raises the alarm: below 1 where nothing was found, else from 1
+    /// to [`MOST_ALARM`], which stands for all that is more.
     pub alarm: Option<f64>,
     /// What was found.
     pub findings: Vec<Finding>,
@@ -106,10 +116,19 @@ impl Check {
         name: &'static str,
         detail: impl Into<String>,
         alarm: f64,
-        findings: Vec<Finding>,
+        mut findings: Vec<Finding>,
     ) -> Self {
-        let state = if findings.is_empty() { State::Ok } else { State::Finding };
-        Self { name, state, detail: detail.into(), alarm: Some(round(alarm.abs(), 3)), findings }
+        let found = !findings.is_empty();
+        for finding in &mut findings {
+            if finding.confidence < SURE {
+                finding.severity = finding.severity.min(Severity::Suspicion);
+            }
+        }
+        // A share and its verdict never contradict each other: what is found has at least all of the alarm.
+        let alarm = if found { alarm.abs().max(1.0) } else { alarm.abs().min(BELOW_ALARM) };
+        let alarm = round(if alarm.is_nan() { f64::from(u8::from(found)) } else { alarm.min(MOST_ALARM) }, 3);
+        let state = if found { State::Finding } else { State::Ok };
+        Self { name, state, detail: detail.into(), alarm: Some(alarm), findings }
     }
 
     /// Why the data do not tell.

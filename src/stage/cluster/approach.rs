@@ -113,7 +113,7 @@ impl Plan {
                 };
                 Ok((clustering, trials.found()))
             }
-            Amount::Clusters(_) | Amount::Ratio(_) => {
+            Amount::Usual | Amount::Clusters(_) | Amount::Ratio(_) => {
                 let mut best: Option<Clustering> = None;
                 for attempt in 0..draws {
                     let seeds =

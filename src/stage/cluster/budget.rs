@@ -37,7 +37,7 @@ impl Plan {
     /// No fewer texels than clusters that are asked for.
     fn least_sample(&self) -> usize {
         match self.options.amount {
-            Amount::Clusters(_) | Amount::Ratio(_) => self.most_clusters,
+            Amount::Usual | Amount::Clusters(_) | Amount::Ratio(_) => self.most_clusters,
             Amount::Error(_) => 1,
         }
     }

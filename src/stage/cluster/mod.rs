@@ -40,6 +40,9 @@ const METHOD: u64 = 2;
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;
 
+/// Clusters where no number is given.
+const USUAL_CLUSTERS: usize = 256;
+
 /// Most clusters that a search for an error goes up to.
 const MOST_SEARCHED: usize = 4096;
 
@@ -50,6 +53,8 @@ const PASSES: &str = "clustering";
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Amount {
+    /// 256, or as many as there are texels where those are fewer. Recipes have the number.
+    Usual,
     /// This many, n_c.
     Clusters(usize),
     /// The fewest whose weighted mean |dL*| from the centres is at most this.
@@ -214,7 +219,12 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let tile = model.tile()?;
     let description = measurement.description();
     let most = tile.size.texels().min(MOST_CLUSTERS);
+    let options = &match options.amount {
+        Amount::Usual => Options { amount: Amount::Clusters(most.min(USUAL_CLUSTERS)), ..options.clone() },
+        _ => options.clone(),
+    };
     let most_clusters = match options.amount {
+        Amount::Usual => most.min(USUAL_CLUSTERS),
         Amount::Clusters(clusters) if (1..=most).contains(&clusters) => clusters,
         Amount::Clusters(clusters) => {
             return Err(Error::usage(format!(

@@ -8,6 +8,7 @@ mod cascade;
 mod page;
 mod place;
 pub mod pyramid;
+mod verify;
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -29,6 +30,7 @@ use crate::store::mapped::write_file;
 use cascade::{Cascade, Sink};
 use place::Place;
 use pyramid::Pyramid;
+pub(crate) use verify::verify;
 
 /// Sides of a tile that are allowed.
 pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
@@ -203,6 +205,7 @@ impl Plan {
         } else {
             tiles.found.store(total, Ordering::Relaxed);
         }
+        self.keep_checksums()?;
         self.place
             .write_beside(&self.place.page, &page::viewer(&self.pyramid, self.encoding, &self.place.name)?)?;
         self.place.write_beside(&self.place.description, &page::description(&self.pyramid, self.encoding))?;
@@ -214,6 +217,14 @@ impl Plan {
             tiles_found: found,
             tiles_written: total - found,
         })
+    }
+
+    /// Keeps the checksums of all tiles beside the recipe, by which exchanged ones are found.
+    fn keep_checksums(&self) -> Result<()> {
+        let mut state = self.place.state()?.unwrap_or_default();
+        let checksums = verify::checksums(&self.pyramid, &self.place)?;
+        state.insert(verify::CHECKSUMS.to_owned(), json!(checksums));
+        self.place.write_state(state)
     }
 
     /// Whether every tile is there.

@@ -13,13 +13,8 @@ use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use crate::store::mapped::{self, MappedStorage, Temporary, write_file};
 use crate::store::output::Existing;
-use crate::store::{Store, is_lock};
-
-/// Name of the file with the recipe.
-const STATE: &str = "btfkit.json";
-
-/// Ending of the name of the folder of tiles: what viewers expect.
-const FOLDER_ENDING: &str = "_files";
+use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
+use crate::store::{FORMAT, Store, is_lock, metadata};
 
 /// The files of a pyramid.
 pub(super) struct Place {
@@ -66,15 +61,8 @@ impl Place {
     }
 
     fn compare(&self, recipe: &Value) -> Result<()> {
-        let path = self.folder.join(STATE);
-        match std::fs::read(&path) {
-            Ok(text) => {
-                let found: Map<String, Value> = serde_json::from_slice(&text)
-                    .map_err(|error| Error::input(format!("{}: {error}", path.display())))?;
-                return recipe::expect_same(&self.description, &found, recipe);
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-            Err(error) => return Err(Error::io("read", &path, error)),
+        if let Some(found) = self.state()? {
+            return recipe::expect_same(&self.description, &found, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|entry| mapped::is_temporary(&entry.path()) || is_lock(&entry.path()))
@@ -103,15 +91,45 @@ impl Place {
         let _lock = Store::at(&self.folder).lock("", context)?;
         self.compare(recipe)?;
         MappedStorage::new(&self.folder).sweep()?;
-        let path = self.folder.join(STATE);
-        if path.exists() {
+        if self.folder.join(STATE).exists() {
             return Ok(());
         }
         let state = json!({
-            "kind": "deepzoom", "version": env!("CARGO_PKG_VERSION"),
+            "kind": "deepzoom", "format": FORMAT, "version": env!("CARGO_PKG_VERSION"),
             "recipe": recipe, "digest": recipe::digest(recipe),
         });
+        self.write_state(state.as_object().cloned().unwrap_or_default())
+    }
+
+    /// What the file with the recipe holds; `None` where there is none.
+    ///
+    /// # Errors
+    /// Where it is damaged, or was changed.
+    pub(super) fn state(&self) -> Result<Option<Map<String, Value>>> {
+        let path = self.folder.join(STATE);
+        let Some(state) = metadata::read_object(&path)? else { return Ok(None) };
+        // The oldest had neither version nor seal.
+        let checked = if state.contains_key("format") {
+            metadata::check_ours(&state, true)
+        } else {
+            metadata::check_digest(&state)
+        };
+        checked.map_err(|what| {
+            Error::input(format!("{}: {what}", path.display()))
+                .hint("make the pyramid anew: under another name, or with --force")
+        })?;
+        Ok(Some(state))
+    }
+
+    /// Writes it, sealed, unless it is the same.
+    pub(super) fn write_state(&self, mut state: Map<String, Value>) -> Result<()> {
+        let seal = metadata::seal(&state);
+        state.insert("seal".to_owned(), json!(seal));
+        let path = self.folder.join(STATE);
         let text = serde_json::to_vec_pretty(&state).map_err(|error| Error::internal(error.to_string()))?;
+        if metadata::read_file(&path)?.as_deref() == Some(text.as_slice()) {
+            return Ok(());
+        }
         write_file(&path, &text)
     }
 

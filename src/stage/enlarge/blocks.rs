@@ -69,7 +69,8 @@ impl Tile {
         let description = Description {
             size: subject.options.size,
             clusters: subject.clusters.clusters,
-            source: self.kept.source.then_some(subject.tile),
+            tile: subject.tile,
+            keep_source: self.kept.source,
             keep_normals: self.kept.normals,
         };
         Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model, context)

@@ -215,6 +215,7 @@ impl Plan {
         let texel_bytes = clusters.tile_bytes / self.subject.tile.texels() as u64;
         let report = |(output, units): (&Output, Units)| {
             let enlarged = Enlarged::open(&output.path)?;
+            enlarged.finish(context)?;
             let (subject, method) = (&self.subject, self.rule.method());
             Ok(Report {
                 output: output.path.clone(),

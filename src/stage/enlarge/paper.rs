@@ -97,8 +97,13 @@ impl Paper {
         let digest = recipe::digest(&output.recipe);
         let mut field =
             Synthesis::new(&self.surface.field, output.seed, height, width, extent(subject), shared.kernel)?;
-        let description =
-            Description { size, clusters: subject.clusters.clusters, source: None, keep_normals };
+        let description = Description {
+            size,
+            clusters: subject.clusters.clusters,
+            tile: subject.tile,
+            keep_source: false,
+            keep_normals,
+        };
         let store =
             Enlarged::create(&output.path, &description, &output.recipe, &subject.options.model, context)?;
         let state = EnlargeState::read(&output.path, &digest)?;

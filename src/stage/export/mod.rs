@@ -8,8 +8,9 @@ mod pictures;
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{SampleType, Samples, f16};
+use btfkit_formats::{SampleType, Samples};
 
+use crate::archive::adapt::half;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
@@ -133,7 +134,7 @@ fn linear(samples: &Samples, transfer: Transfer) -> Samples {
     }
     let values = (0..samples.len()).map(|at| transfer.decode(samples.value(at).unwrap_or(0.0)));
     match samples.sample_type() {
-        SampleType::U8 | SampleType::F16 => Samples::F16(values.map(f16::from_f64).collect()),
+        SampleType::U8 | SampleType::F16 => Samples::F16(values.map(half).collect()),
         SampleType::U16 | SampleType::F32 => Samples::F32(values.map(|value| value as f32).collect()),
     }
 }

@@ -108,12 +108,7 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
-        let attributes = Store::at(path).attributes()?.ok_or_else(|| {
-            Error::missing(format!(
-                "{}: no store here, expected a measurement, a model or an enlarged index",
-                path.display()
-            ))
-        })?;
+        let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
         let digest = attributes.get("digest").cloned().unwrap_or_default();
         let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
         if options.plane.is_some() && kind != model::KIND {
@@ -421,12 +416,10 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
 /// The model that an enlarged index at a path refers to; where it is not named, it is looked for where it lay when the
 /// index was made, as seen from the index, and beside it.
 pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) -> Result<Model> {
-    let attributes = enlarged.attributes()?;
-    let expected = attributes.get("recipe").and_then(|recipe| recipe.get("model")).and_then(Value::as_str);
-    let stages = enlarged.method()?.stages();
+    let stages = enlarged.method().stages();
     let open = |path: &Path| {
         let model = Model::open(path)?;
-        if Some(model.digest_of(stages)?.as_str()) == expected {
+        if enlarged.recipe().model == model.digest_of(stages)? {
             return Ok(model);
         }
         Err(Error::recipe(format!(
@@ -438,7 +431,7 @@ pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) 
     if let Some(path) = named {
         return open(path).map_err(|error| error.hint("--model names the model that it was enlarged from"));
     }
-    let places = model_place::places(place, attributes.get("model_name").and_then(Value::as_str));
+    let places = model_place::places(place, enlarged.model_name());
     let mut failed = None;
     for path in places.iter().filter(|path| path.exists()) {
         match open(path) {

@@ -34,12 +34,7 @@ pub(super) struct Texels {
 impl Subject {
     /// Opens what lies at a path, and its model.
     pub(super) fn open(path: &Path, model: Option<&Path>, size: Option<Size>) -> Result<(Self, Model)> {
-        let attributes = Store::at(path).attributes()?.ok_or_else(|| {
-            Error::missing(format!(
-                "{}: no store here, expected an enlarged index or a model",
-                path.display()
-            ))
-        })?;
+        let attributes = Store::at(path).expect_one_of(&[enlarged::KIND, model::KIND])?;
         let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
         match (kind, size) {
             (enlarged::KIND, None) => {

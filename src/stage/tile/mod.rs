@@ -5,21 +5,19 @@ mod features;
 
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 pub use choice::Choice;
 pub(crate) use features::features;
 
-use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
 use crate::run::Context;
 use crate::run::recipe::METHOD;
 use crate::shape::Size;
-use crate::store::Store;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
+pub use crate::store::tile_report::TileReport as Report;
 use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use features::lattice_of;
 
@@ -36,32 +34,6 @@ pub struct Options {
     pub lattice: LatticeChoice,
     /// Seed of the search.
     pub seed: u64,
-}
-
-/// How a tile was cut.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Report {
-    /// Rows and columns of the tile.
-    pub size: [usize; 2],
-    /// Whether its borders join.
-    pub wraps: bool,
-    /// Where it was cut; absent where the whole measurement is the tile.
-    pub patch: Option<Patch>,
-    /// Step across the seams relative to that between ordinary neighbours (1: cannot be told).
-    pub seam_visibility: f64,
-    /// The same for the patch repeated without cutting.
-    pub uncut_visibility: f64,
-    /// Transfer curve of the measurement's samples.
-    pub transfer: Transfer,
-    /// Rows and columns of the measurement.
-    pub measurement_size: [usize; 2],
-    /// The lattice that was found in the plane, or given.
-    #[serde(default)]
-    pub lattice: Lattice,
-    /// Cycles of each of its waves down and across the tile (of one whose borders do not join, its largest part of
-    /// whole cells); none where the tile holds no whole number of cells.
-    #[serde(default)]
-    pub cells: Vec<[i32; 2]>,
 }
 
 /// A cut, ready to be made.
@@ -130,10 +102,10 @@ impl Plan {
     /// # Errors
     /// Where it has been run by another recipe.
     pub fn is_done(&self) -> Result<bool> {
-        match Store::at(&self.model).attributes()? {
-            Some(_) => Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe),
-            None => Ok(false),
+        if !self.model.join("zarr.json").exists() {
+            return Ok(false);
         }
+        Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe)
     }
 
     /// Cuts the tile, unless that is done.
@@ -153,6 +125,8 @@ impl Plan {
             seam_visibility: if tile.wraps { seam_visibility(&features, &tile) } else { 1.0 },
             uncut_visibility: patch.map_or(1.0, |patch| seam_visibility(&features, &patch.uncut())),
             transfer: description.transfer,
+            channels: Some(description.channels.clone()),
+            samples: Some(description.sample_type.name().to_owned()),
             measurement_size: [plane.height, plane.width],
             lattice,
             cells: cells(&lattice, &tile),

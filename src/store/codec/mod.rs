@@ -58,6 +58,29 @@ impl Chain {
     }
 }
 
+/// A list of codecs in one way of writing: what has no configuration may be written as a name, or without it.
+pub(super) fn plainly(codecs: &Value) -> Value {
+    let named = |name: Value, configuration: Value| json!({"name": name, "configuration": configuration});
+    match codecs {
+        Value::Array(list) => list
+            .iter()
+            .map(|codec| match codec {
+                Value::String(name) => named(name.as_str().into(), json!({})),
+                other => plainly(other),
+            })
+            .collect(),
+        Value::Object(members) => {
+            let mut members: serde_json::Map<String, Value> =
+                members.iter().map(|(name, value)| (name.clone(), plainly(value))).collect();
+            if members.contains_key("name") {
+                members.entry("configuration").or_insert_with(|| json!({}));
+            }
+            Value::Object(members)
+        }
+        other => other.clone(),
+    }
+}
+
 /// Where in a list of codecs those of chunks are.
 fn inner(codecs: &Value) -> &'static str {
     let sharding = codecs.pointer("/0/name").is_some_and(|name| name == "sharding_indexed");

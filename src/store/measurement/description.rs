@@ -31,6 +31,12 @@ pub struct Description {
 }
 
 impl Description {
+    /// Views, rows, columns, lights, channels.
+    pub fn shape(&self) -> [usize; 5] {
+        let Size { height, width } = self.size;
+        [self.views.len(), height, width, self.lights.len(), self.channels.len()]
+    }
+
     /// Samples of a texel under one pair of directions.
     pub fn n_channels(&self) -> usize {
         self.channels.len()

@@ -5,10 +5,12 @@
 //! | `reflectance` | [view, y, x, light, channel] | u8, u16, f16 or f32, as measured |
 //! | `luminance` | [view, y, x, light] | u8, L* code `round(2.55 L*)` |
 //! | `view_direction`, `light_direction` | [n, 2] | f64, theta and phi in radians |
+//! | `view_theta`, `view_phi`, `light_theta`, `light_phi` | [n] | f64, the same in degrees |
 //!
 //! One shard is one view (of a part of the plane), so a view is the unit of an import.
 
 mod description;
+mod facts;
 mod read;
 mod write;
 
@@ -20,12 +22,13 @@ use serde_json::{Map, Value, json};
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use crate::shape::{Size, Window};
+use crate::store::checksums::DIGITS;
 use crate::store::codec::{Chain, chunk_codecs};
-use crate::store::{Array, Layout, Lock, Named, Store};
+use crate::store::{Array, Layout, Lock, Named, Store, directions};
 use crate::views::Views;
-use btfkit_formats::Direction;
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
+use facts::Facts;
 pub(crate) use write::encoded_bytes;
 
 /// The attribute `kind` of a measurement store.
@@ -33,6 +36,15 @@ pub const KIND: &str = "measurement";
 
 /// Side of a chunk in texels.
 const CHUNK_SIDE: usize = 16;
+
+/// Longest side of a plane.
+const MOST_SIDE: usize = 1 << 24;
+
+/// The attribute of a finished measurement that holds the checksums of its shards.
+const CHECKSUMS: &str = "checksums";
+
+/// Dimensions of `reflectance`; `luminance` has all but the last.
+const REFLECTANCE_AXES: [&str; 5] = ["view", "y", "x", "light", "channel"];
 
 /// A measurement store, open for reading or writing.
 pub struct Measurement {
@@ -72,91 +84,148 @@ impl Measurement {
         context: &Context<'_>,
     ) -> Result<Self> {
         let recipe = origin.recipe;
-        let store = Store::at(path);
+        let mut store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
         let lock = store.begin_by_recipe(
             KIND,
             recipe,
             json!({
                 "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
+                "channels": description.channels, "samples": description.sample_type.name(),
                 "assumptions": origin.assumptions, "remarks": origin.remarks,
             }),
             context,
         )?;
-        write_directions(&store, "view_direction", "view", &description.views)?;
-        write_directions(&store, "light_direction", "light", &description.lights)?;
+        directions::write(&store, "view", &description.views)?;
+        directions::write(&store, "light", &description.lights)?;
         let side = description.shard_side(limit_bytes);
-        let reflectance = create_reflectance(&store, &description, codec, side)?;
-        let luminance = create_luminance(&store, &description, codec, side)?;
+        let reflectance =
+            store.create_array("reflectance", &reflectance_layout(&description, codec, side)?)?;
+        let luminance = store.create_array("luminance", &luminance_layout(&description, codec, side)?)?;
         let digest = recipe::digest(recipe);
         Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: Some(lock) })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
+    ///
+    /// # Errors
+    /// Where attributes or metadata are not those of a measurement, or do not fit together.
     pub fn open(path: &Path) -> Result<Self> {
-        let store = Store::at(path);
-        let found = store.expect(KIND)?;
-        let reflectance = store.open_array("reflectance")?;
-        let luminance = store.open_array("luminance")?;
-        let views = read_directions(&store, "view_direction")?;
-        let lights = read_directions(&store, "light_direction")?;
-        let damaged = |what: String| Error::input(format!("{}: {what}", path.display()));
-        let &[n_views, height, width, n_lights, _] = reflectance.shape() else {
-            return Err(damaged(format!(
-                "reflectance: got shape {:?}, expected 5 dimensions",
-                reflectance.shape()
-            )));
+        let (store, found) = Store::open(path, KIND)?;
+        let damaged = |what: String| {
+            Error::input(format!("{}: {what}", path.display()))
+                .hint("import the archive again, under another name")
         };
-        let expected = [n_views, height, width, n_lights];
-        let consistent = (n_views, n_lights) == (views.len() as u64, lights.len() as u64)
-            && luminance.shape() == expected
-            && reflectance
-                .shape()
-                .iter()
-                .try_fold(1u64, |product, &n| product.checked_mul(n))
-                .is_some_and(|n| n > 0);
-        if !consistent {
+        let [n_views, height, width, n_lights, n_channels] = store.claimed_shape("reflectance", 5)?[..]
+        else {
+            return Err(Error::internal("a shape of five lengths"));
+        };
+        let facts = Facts::read(&found).map_err(&damaged)?;
+        let views = directions::read(&store, "view")?;
+        let lights = directions::read(&store, "light")?;
+        let sample_type = facts.sample_type(&store)?;
+        let channels = facts.channels(&store)?;
+        let size = Size::new(height, width);
+        let (transfer, white) = (facts.transfer, facts.white);
+        let description = Description { size, channels, sample_type, views, lights, transfer, white };
+        let shape = [n_views, height, width, n_lights, n_channels];
+        if shape != description.shape() || shape.contains(&0) || height.max(width) > MOST_SIDE {
             return Err(damaged(format!(
-                "got reflectance {:?}, luminance {:?}, {} views and {} lights, which do not fit together",
-                reflectance.shape(),
-                luminance.shape(),
-                views.len(),
-                lights.len()
+                "reflectance: got shape {shape:?}, expected {} views, {} lights, {} channels and sides from 1 to \
+                 {MOST_SIDE}",
+                description.views.len(),
+                description.lights.len(),
+                description.n_channels()
             )));
         }
-        let transfer = found
-            .get("transfer")
-            .and_then(|value| serde_json::from_value(value.clone()).ok())
-            .ok_or_else(|| damaged("attribute btfkit.transfer: expected srgb or linear".to_owned()))?;
-        let white = found.get("white").and_then(Value::as_f64).filter(|white| *white > 0.0);
-        let white =
-            white.ok_or_else(|| damaged("attribute btfkit.white: expected a reflectance".to_owned()))?;
-        let digest = found.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
-        let names = crate::store::channel_names(&reflectance)
-            .map_err(|error| damaged(format!("reflectance: {error}")))?;
-        let sample_type = crate::store::sample_type_of(&reflectance)
-            .ok_or_else(|| damaged(format!("reflectance: got samples of {}", reflectance.data_type())))?;
-        let description = Description {
-            size: Size::new(height as usize, width as usize),
-            channels: names,
-            sample_type,
-            views,
-            lights,
-            transfer,
-            white,
-        };
-        let side = reflectance
-            .chunk_shape(&[0; 5])
-            .ok()
-            .and_then(|shape| shape.get(1).map(|side| side.get() as usize))
-            .ok_or_else(|| damaged("reflectance: no shard shape".to_owned()))?;
-        let codec = Chain::of(&store.array_codecs("reflectance")?, &description.chunk());
-        let codec = codec.ok_or_else(|| damaged("reflectance: its codecs are not ours".to_owned()))?;
-        let codes = Chain::of(&store.array_codecs("luminance")?, &description.code_chunk());
-        if codes != Some(codec) || !side.is_multiple_of(CHUNK_SIDE) {
-            return Err(damaged("luminance: other codecs than those of reflectance".to_owned()));
-        }
+        facts.check_recipe(&description).map_err(&damaged)?;
+        let document = store.array_document("reflectance")?;
+        let side = shard_side_of(&document, &description).ok_or_else(|| {
+            damaged(format!(
+                "reflectance: got shards that hold no whole chunks of {CHUNK_SIDE} x {CHUNK_SIDE} texels"
+            ))
+        })?;
+        let codecs = document.get("codecs").cloned().unwrap_or_default();
+        // Where the codecs are none of ours the layout says so.
+        let codec = Chain::of(&codecs, &description.chunk()).unwrap_or(Chain::Stock);
+        let layout = reflectance_layout(&description, codec, side)?;
+        let reflectance = store.check_document("reflectance", &layout, &document)?;
+        let luminance = store.open_array("luminance", &luminance_layout(&description, codec, side)?)?;
+        let digest = facts.digest;
         Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: None })
+    }
+
+    /// Declares the measurement finished, if all views are there: its root then holds checksums, and the metadata of all
+    /// arrays for other programs.
+    ///
+    /// # Errors
+    /// Those of reading and writing, and where a shard's index is damaged.
+    pub fn finish(&self, context: &Context<'_>) -> Result<()> {
+        if self.views_done() < self.description.views.len() {
+            return Ok(());
+        }
+        let checksums = json!({
+            "reflectance": self.store.checksums(&self.reflectance)?,
+            "luminance": self.store.checksums(&self.luminance)?,
+        });
+        let _lock = self.store.lock("", context)?;
+        let mut attributes = self.store.expect(KIND)?;
+        attributes.insert(CHECKSUMS.to_owned(), checksums);
+        self.store.write_finished(attributes, &self.arrays())
+    }
+
+    /// Whether it was declared finished: then its shards have checksums.
+    ///
+    /// # Errors
+    /// Those of reading the attributes.
+    pub fn is_finished(&self) -> Result<bool> {
+        Ok(self.store.expect(KIND)?.contains_key(CHECKSUMS))
+    }
+
+    /// The array whose shards of a view are not those that were written, though each may be intact; `None` where all are,
+    /// or no checksums are kept.
+    ///
+    /// # Errors
+    /// Where a shard is missing, or its index is damaged.
+    pub fn exchanged(&self, view: usize) -> Result<Option<SampleArray>> {
+        let attributes = self.store.expect(KIND)?;
+        let Some(kept) = attributes.get(CHECKSUMS) else { return Ok(None) };
+        for (which, array) in
+            [(SampleArray::Reflectance, &self.reflectance), (SampleArray::Luminance, &self.luminance)]
+        {
+            let found = format!("{:08x}", self.store.checksum(array, view as u64)?);
+            let kept = kept.get(which.name()).and_then(Value::as_str).unwrap_or_default();
+            if kept.get(view * DIGITS..(view + 1) * DIGITS) != Some(found.as_str()) {
+                return Ok(Some(which));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Checks that the coordinates by which other programs select are the directions.
+    ///
+    /// # Errors
+    /// Where they are not.
+    pub fn check_coordinates(&self) -> Result<()> {
+        directions::check_coordinates(&self.store, "view", &self.description.views)?;
+        directions::check_coordinates(&self.store, "light", &self.description.lights)
+    }
+
+    /// Whether the root holds the metadata of all arrays as they are.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn is_consolidated(&self) -> Result<bool> {
+        self.store.is_consolidated(&self.arrays())
+    }
+
+    /// Names of its arrays.
+    fn arrays(&self) -> Vec<String> {
+        let mut names = vec!["reflectance".to_owned(), "luminance".to_owned()];
+        names.extend(
+            ["view", "light"].iter().flat_map(|dimension| directions::arrays(dimension, self.store.format())),
+        );
+        names
     }
 
     /// What it holds.
@@ -171,7 +240,16 @@ impl Measurement {
 
     /// The attributes of its group: how samples are meant, what was assumed, the recipe.
     pub fn attributes(&self) -> Result<Map<String, Value>> {
-        self.store.expect(KIND)
+        let mut attributes = self.store.expect(KIND)?;
+        // They are of this store's files.
+        attributes.remove(CHECKSUMS);
+        attributes.remove("seal");
+        Ok(attributes)
+    }
+
+    /// Version of its layout.
+    pub fn format(&self) -> u64 {
+        self.store.format()
     }
 
     /// Where it lies.
@@ -269,9 +347,8 @@ pub struct Origin<'a> {
     pub remarks: &'a [(String, String)],
 }
 
-fn create_reflectance(store: &Store, description: &Description, codec: Chain, side: usize) -> Result<Array> {
-    let names = ["view", "y", "x", "light", "channel"];
-    let mut layout = sample_layout(description, &names, description.n_channels(), side);
+fn reflectance_layout(description: &Description, codec: Chain, side: usize) -> Result<Layout<'static>> {
+    let mut layout = sample_layout(description, &REFLECTANCE_AXES, description.n_channels(), side);
     layout.data_type = crate::store::data_type_of(description.sample_type);
     layout.attributes.insert("channels".to_owned(), json!(description.channels));
     let one = match description.sample_type {
@@ -282,17 +359,26 @@ fn create_reflectance(store: &Store, description: &Description, codec: Chain, si
     let units = format!("reflectance, {one}, through the transfer curve of the group");
     layout.attributes.insert("units".to_owned(), json!(units));
     layout.codecs = Some(chunk_codecs(codec, &description.chunk())?);
-    store.create_array("reflectance", &layout)
+    Ok(layout)
 }
 
-fn create_luminance(store: &Store, description: &Description, codec: Chain, side: usize) -> Result<Array> {
-    let mut layout = sample_layout(description, &["view", "y", "x", "light"], 1, side);
+fn luminance_layout(description: &Description, codec: Chain, side: usize) -> Result<Layout<'static>> {
+    let mut layout = sample_layout(description, &REFLECTANCE_AXES[..4], 1, side);
     layout.shape.pop();
     layout.chunk.pop();
     layout.shard.as_mut().map(Vec::pop);
     layout.attributes.insert("units".to_owned(), json!("CIE 1976 L* (D65), code = round(2.55 L*)"));
     layout.codecs = Some(chunk_codecs(codec, &description.code_chunk())?);
-    store.create_array("luminance", &layout)
+    Ok(layout)
+}
+
+/// Side of the shards that a document claims: whole chunks, and no more than a shard may hold, nor much more than the
+/// plane.
+fn shard_side_of(document: &Map<String, Value>, description: &Description) -> Option<usize> {
+    let shape = document.get("chunk_grid")?.get("configuration")?.get("chunk_shape")?;
+    let side = usize::try_from(shape.get(1)?.as_u64()?).ok()?;
+    let most = description.shard_side(SHARD_LIMIT_BYTES);
+    ((CHUNK_SIDE..=most).contains(&side) && side.is_multiple_of(CHUNK_SIDE)).then_some(side)
 }
 
 /// The layout of `reflectance`: [view, y, x, light, channel] in shards of one view.
@@ -313,38 +399,6 @@ fn sample_layout<'a>(
         codecs: None,
         names,
         attributes: Map::new(),
-    }
-}
-
-/// Writes directions as [n, 2] theta, phi in radians.
-pub(crate) fn write_directions(
-    store: &Store,
-    name: &str,
-    dimension: &str,
-    directions: &[Direction],
-) -> Result<()> {
-    let angles: Vec<f64> = directions.iter().flat_map(|d| [d.theta_rad, d.phi_rad]).collect();
-    let names = [dimension, "angle"];
-    let mut layout = Layout::small::<f64>(&names, &[directions.len(), 2]);
-    layout.attributes.insert("units".to_owned(), json!("rad"));
-    layout.attributes.insert("angles".to_owned(), json!(["theta", "phi"]));
-    store.write(name, &layout, &angles)
-}
-
-/// Reads directions written by [`write_directions`].
-pub(crate) fn read_directions(store: &Store, name: &str) -> Result<Vec<Direction>> {
-    let (_, angles) = store.read::<f64>(name, &[0, 2])?;
-    let in_range = |d: &Direction| (0.0..=1.571).contains(&d.theta_rad) && d.phi_rad.is_finite();
-    let directions: Vec<Direction> =
-        angles.chunks_exact(2).map(|a| Direction { theta_rad: a[0], phi_rad: a[1] }).collect();
-    match directions.iter().position(|d| !in_range(d)) {
-        None => Ok(directions),
-        Some(at) => Err(Error::input(format!(
-            "{}: {name}: direction {at} is theta {} phi {} rad, expected theta in 0..pi/2",
-            store.path().display(),
-            directions[at].theta_rad,
-            directions[at].phi_rad
-        ))),
     }
 }
 

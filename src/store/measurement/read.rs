@@ -2,6 +2,7 @@
 //! shards, and cut to the window.
 
 use std::ops::Range;
+use std::path::Path;
 
 use btfkit_formats::{SampleType, Samples, f16};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
 use crate::store::codec::{Chunk, ChunkCodec};
 use crate::store::mapped::MappedFile;
-use crate::store::shard;
+use crate::store::{DAMAGED, Store, shard};
 
 /// A shard, and where its chunks lie in it.
 struct Shard {
@@ -54,8 +55,9 @@ impl Measurement {
         }
         let texel_bytes = chunk.bytes() / (CHUNK_SIDE * CHUNK_SIDE);
         let row_bytes = window.size.width * texel_bytes;
-        let mut bytes = vec![0; window.size.height * row_bytes];
+        // Opened first: what is not there is not made room for.
         let shards = self.open_shards(array, view, window)?;
+        let mut bytes = vec![0; window.size.height * row_bytes];
         // Bands of the window that lie in one row of chunks each; every band is one thread's.
         let mut bands = Vec::new();
         let (mut rest, mut y) = (bytes.as_mut_slice(), window.y);
@@ -109,7 +111,7 @@ impl Measurement {
                 y / CHUNK_SIDE * CHUNK_SIDE,
                 x / CHUNK_SIDE * CHUNK_SIDE
             ))
-            .hint("the store is damaged: delete this file and run the command that made it again")
+            .hint(DAMAGED)
         };
         let place = [y / self.side, x / self.side];
         let shard = shards.iter().find(|(at, _)| *at == place).map(|(_, shard)| shard);
@@ -119,6 +121,31 @@ impl Measurement {
         let range = shard.chunks.get(number).cloned().flatten().ok_or_else(|| damaged("it is absent"))?;
         let bytes = shard.file.as_ref().get(range).ok_or_else(|| damaged("it lies beyond the file"))?;
         codec.decode(bytes, texels).map_err(|error| damaged(&error.to_string()))
+    }
+
+    /// Checks that a shard holds every chunk that lies in the plane.
+    fn expect_chunks(
+        &self,
+        path: &Path,
+        chunks: &[Option<Range<usize>>],
+        [sy, sx]: [usize; 2],
+    ) -> Result<()> {
+        let across = self.side / CHUNK_SIDE;
+        let Size { height, width } = self.description.size;
+        let inside = |place: usize| {
+            let (y, x) =
+                (sy * self.side + place / across * CHUNK_SIDE, sx * self.side + place % across * CHUNK_SIDE);
+            y < height && x < width
+        };
+        match (0..across * across)
+            .find(|&place| inside(place) && chunks.get(place).is_none_or(Option::is_none))
+        {
+            None => Ok(()),
+            Some(place) => {
+                let what = format!("{}: its chunk number {place} is absent", path.display());
+                Err(Error::input(what).hint(DAMAGED))
+            }
+        }
     }
 
     /// Maps the shards that a window touches.
@@ -136,17 +163,10 @@ impl Measurement {
             .map(|[sy, sx]| {
                 let corner = Window { y: sy * self.side, x: sx * self.side, size: Size::new(1, 1) };
                 let path = self.shard_path(array, view, corner);
-                let file = MappedFile::open(&path).map_err(|error| match error.kind() {
-                    std::io::ErrorKind::NotFound => {
-                        Error::missing(format!("{}: this shard has not been written", path.display()))
-                            .hint("run the command that makes this store again; it goes on where it stopped")
-                    }
-                    _ => Error::io("read", &path, error),
-                })?;
-                let chunks = shard::chunk_ranges(file.as_ref(), across * across).map_err(|what| {
-                    Error::input(format!("{}: {what}", path.display()))
-                        .hint("the store is damaged: delete this file and run the command that made it again")
-                })?;
+                let file = Store::map_chunk(&path)?;
+                let chunks = shard::chunk_ranges(file.as_ref(), across * across)
+                    .map_err(|what| Error::input(format!("{}: {what}", path.display())).hint(DAMAGED))?;
+                self.expect_chunks(&path, &chunks, [sy, sx])?;
                 Ok(([sy, sx], Shard { file, chunks }))
             })
             .collect()

@@ -9,6 +9,7 @@ use crate::{Error, Result, SampleType};
 
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
+    /// Without that of its layer.
     pub(super) name: String,
     pub(super) stored: Stored,
     pub(super) quantize_linearly: bool,
@@ -27,6 +28,8 @@ pub(super) struct Channels {
     pub(super) stored: Vec<Channel>,
     /// Numbers of the channels but alpha, in the order in which they are handed out.
     pub(super) order: Vec<usize>,
+    /// The layer that all of them are in, if they are in one.
+    pub(super) layer: Option<String>,
 }
 
 impl Channels {
@@ -60,12 +63,15 @@ impl Channels {
             }
             stored.push(Channel { name, stored: kind, quantize_linearly });
         }
-        require_one_layer(&stored)?;
+        let layer = only_layer(&stored)?;
+        for channel in stored.iter_mut().filter(|_| layer.is_some()) {
+            channel.name = split_layer(&channel.name).1.to_owned();
+        }
         let order = order_of(&stored);
         if order.is_empty() {
             return Err(unsupported(format!("{} channels", stored.len()), "a channel that is not alpha"));
         }
-        Ok(Channels { stored, order })
+        Ok(Channels { stored, order, layer })
     }
 
     pub(super) fn names(&self) -> Vec<String> {
@@ -104,25 +110,31 @@ pub(super) fn text(reader: &mut Reader<'_>) -> Result<String> {
     }
 }
 
-/// A point in a name separates the layer from the channel, unless it is that of a wavelength.
-fn layer(name: &str) -> &str {
+/// The layer in a name and what is left. A point separates them, unless it is that of a wavelength.
+fn split_layer(name: &str) -> (&str, &str) {
     if wavelength_nm(name).is_some() {
         // Unpolarised emission and reflectance are the picture itself.
         return match quantity(name) {
-            ("S0" | "T", _) => "",
-            (other, _) => other,
+            ("" | "S0" | "T", _) => ("", name),
+            (other, rest) => (other, rest),
         };
     }
-    name.rsplit_once('.').map_or("", |(layer, _)| layer)
+    let mut points = name
+        .match_indices('.')
+        .filter_map(|(at, _)| Some((name.get(..at)?, name.get(at.checked_add(1)?..)?)));
+    let wavelength = points.find(|(_, rest)| wavelength_nm(rest).is_some());
+    wavelength.or_else(|| name.rsplit_once('.')).unwrap_or(("", name))
 }
 
-fn require_one_layer(channels: &[Channel]) -> Result<()> {
-    let mut layers: Vec<&str> = channels.iter().map(|channel| layer(&channel.name)).collect();
+/// The layer that all channels are in: then what it is called does not matter.
+fn only_layer(channels: &[Channel]) -> Result<Option<String>> {
+    let mut layers: Vec<&str> = channels.iter().map(|channel| split_layer(&channel.name).0).collect();
     layers.sort_unstable();
     layers.dedup();
     match layers.as_slice() {
-        [] | [""] => Ok(()),
-        _ => Err(unsupported(format!("the layers {layers:?}"), "channels without layers")),
+        [] | [""] => Ok(None),
+        &[only] if !matches!(only, "S1" | "S2" | "S3") => Ok(Some(only.to_owned())),
+        _ => Err(unsupported(format!("the layers {layers:?}"), "channels without layers, or of one layer")),
     }
 }
 

@@ -1,4 +1,10 @@
-//! The first image file directory of a TIFF (TIFF 6.0, section 2; BigTIFF: libtiff's specification).
+//! The image file directories of a TIFF (TIFF 6.0, section 2; BigTIFF: libtiff's specification), and which of them is
+//! the picture.
+//!
+//! Many files hold more than the picture: previews before it (camera raws, of which the first directory is a
+//! thumbnail), smaller versions after it, pages, masks. `NewSubfileType` tells them apart. The picture is the only
+//! directory of the file's chain that is no reduced version of another; if all of the chain are reduced, the only
+//! such one among their `SubIFDs`. Anything else is refused, as what is meant cannot be known.
 
 use crate::picture::size::unsupported;
 use crate::reader::Reader;
@@ -6,6 +12,8 @@ use crate::{Error, Result};
 
 /// Numbers of the tags that are looked at.
 pub(super) mod tag {
+    pub(crate) const NEW_SUBFILE_TYPE: u16 = 254;
+    pub(crate) const SUBFILE_TYPE: u16 = 255;
     pub(crate) const WIDTH: u16 = 256;
     pub(crate) const HEIGHT: u16 = 257;
     pub(crate) const BITS_PER_SAMPLE: u16 = 258;
@@ -23,9 +31,17 @@ pub(super) mod tag {
     pub(crate) const TILE_LENGTH: u16 = 323;
     pub(crate) const TILE_OFFSETS: u16 = 324;
     pub(crate) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(crate) const SUB_IFDS: u16 = 330;
     pub(crate) const EXTRA_SAMPLES: u16 = 338;
     pub(crate) const SAMPLE_FORMAT: u16 = 339;
 }
+
+/// Directories of one file that are looked at.
+const MAX_DIRECTORIES: usize = 256;
+
+/// Bits of `NewSubfileType`: a smaller version of another picture; a mask that says what of one is seen.
+const REDUCED: u64 = 1;
+const MASK: u64 = 4;
 
 /// Fields of either byte order, and of either width where the two forms of TIFF differ.
 struct Fields<'a> {
@@ -69,16 +85,66 @@ struct Entry {
     at: u64,
 }
 
-/// The entries of the only directory of a file.
+/// The entries of one directory of a file.
 pub(super) struct Directory<'a> {
     bytes: &'a [u8],
-    start: Fields<'a>,
+    little_endian: bool,
+    big: bool,
     entries: Vec<Entry>,
+    /// Offset of the directory after it; 0 is none.
+    next: u64,
     pub(super) at: usize,
 }
 
 impl<'a> Directory<'a> {
+    /// The directory of the picture; see the [module](self).
     pub(super) fn read(bytes: &'a [u8]) -> Result<Directory<'a>> {
+        let first = Directory::first(bytes)?;
+        let at = first.at;
+        let chain = first.followed()?;
+        let children: Vec<Directory<'a>> = if chain.iter().all(|one| one.is_reduced().unwrap_or(false)) {
+            let mut children = Vec::new();
+            for parent in &chain {
+                for offset in parent.list(tag::SUB_IFDS)?.unwrap_or_default() {
+                    if children.len() >= MAX_DIRECTORIES {
+                        return Err(too_many(parent.at));
+                    }
+                    children.push(parent.sibling(offset)?);
+                }
+            }
+            children
+        } else {
+            Vec::new()
+        };
+        let (directories, of_chain) = (chain.len(), chain.len().saturating_add(children.len()));
+        let mut pictures = Vec::new();
+        for directory in chain.into_iter().chain(children) {
+            let kind = directory.number(tag::NEW_SUBFILE_TYPE, Some(0))?;
+            if kind & MASK != 0 && kind & REDUCED == 0 {
+                return Err(unsupported("a transparency mask", "a picture that is opaque").at(directory.at));
+            }
+            if !directory.is_reduced()? {
+                pictures.push(directory);
+            }
+        }
+        let mut pictures = pictures.into_iter();
+        match (pictures.next(), pictures.len()) {
+            (Some(only), 0) => Ok(only),
+            (Some(first), more) => Err(unsupported(
+                format!("{} pictures in {directories} directories", more.saturating_add(1)),
+                "one, beside smaller versions of it; save it alone in a file (tiffcp, or ImageMagick's FILE.tif[0])",
+            )
+            .at(first.at)),
+            (None, _) => Err(unsupported(
+                format!("only smaller versions of a picture (NewSubfileType 1) in {of_chain} directories"),
+                "the full picture; a camera's raw file must be converted first, to a TIFF of 16 bits say",
+            )
+            .at(at)),
+        }
+    }
+
+    /// The first directory of a file, whatever it is for.
+    pub(super) fn first(bytes: &'a [u8]) -> Result<Directory<'a>> {
         let mut start = Fields { reader: Reader::new(bytes), little_endian: false, big: false };
         start.little_endian = match start.reader.take(2)? {
             b"II" => true,
@@ -96,6 +162,10 @@ impl<'a> Directory<'a> {
             return Err(Error::malformed("other offsets", "BigTIFF with offsets of 8 bytes").at(4usize));
         }
         let offset = start.word()?;
+        Directory::at(bytes, &start, offset)
+    }
+
+    fn at(bytes: &'a [u8], start: &Fields<'a>, offset: u64) -> Result<Directory<'a>> {
         let mut fields = start.moved_to(bytes, offset)?;
         let at = fields.reader.position();
         let count = if fields.big { fields.word()? } else { u64::from(fields.u16()?) };
@@ -110,18 +180,49 @@ impl<'a> Directory<'a> {
             let at = if inline { u64::try_from(value_at).unwrap_or(u64::MAX) } else { value };
             entries.push(Entry { tag, kind, count, at });
         }
-        if fields.word()? != 0 {
-            return Err(unsupported("a second directory", "one picture in the file").at(at));
-        }
+        let next = fields.word()?;
         entries.sort_by_key(|entry| entry.tag);
         if let Some((entry, _)) = entries.iter().zip(entries.iter().skip(1)).find(|(a, b)| a.tag == b.tag) {
             return Err(Error::malformed(format!("two entries of tag {}", entry.tag), "one").at(at));
         }
-        Ok(Directory { bytes, start, entries, at })
+        Ok(Directory { bytes, little_endian: start.little_endian, big: start.big, entries, next, at })
+    }
+
+    fn start(&self) -> Fields<'a> {
+        Fields { reader: Reader::new(self.bytes), little_endian: self.little_endian, big: self.big }
+    }
+
+    /// Another directory of the same file.
+    fn sibling(&self, offset: u64) -> Result<Directory<'a>> {
+        Directory::at(self.bytes, &self.start(), offset)
+    }
+
+    /// This directory and those that follow it.
+    fn followed(self) -> Result<Vec<Directory<'a>>> {
+        let mut chain = vec![self];
+        while let Some(last) = chain.last().filter(|last| last.next != 0) {
+            let next = last.sibling(last.next)?;
+            if chain.len() >= MAX_DIRECTORIES {
+                return Err(too_many(next.at));
+            }
+            if chain.iter().any(|known| known.at == next.at) {
+                return Err(
+                    Error::malformed("directories that follow each other in a ring", "an end").at(next.at)
+                );
+            }
+            chain.push(next);
+        }
+        Ok(chain)
+    }
+
+    /// Whether it is a smaller version of another picture. (The older tag counts from 1, the full picture.)
+    fn is_reduced(&self) -> Result<bool> {
+        let older = self.number(tag::SUBFILE_TYPE, Some(1))?;
+        Ok(self.number(tag::NEW_SUBFILE_TYPE, Some(0))? & REDUCED != 0 || older == 2)
     }
 
     pub(super) fn little_endian(&self) -> bool {
-        self.start.little_endian
+        self.little_endian
     }
 
     /// The unsigned integers of a tag, if there is one.
@@ -132,7 +233,7 @@ impl<'a> Directory<'a> {
             let found = format!("the type {} of tag {tag}", entry.kind);
             return Err(Error::malformed(found, "unsigned integers").at(self.at));
         };
-        let mut fields = self.start.moved_to(self.bytes, entry.at)?;
+        let mut fields = self.start().moved_to(self.bytes, entry.at)?;
         let left = fields.reader.rest().len();
         let needed = entry.count.saturating_mul(u64::from(len));
         if needed > u64::try_from(left).unwrap_or(u64::MAX) {
@@ -154,6 +255,10 @@ impl<'a> Directory<'a> {
             (None, None) => Err(Error::malformed(format!("no tag {tag}"), "one").at(self.at)),
         }
     }
+}
+
+fn too_many(at: usize) -> Error {
+    unsupported(format!("more than {MAX_DIRECTORIES} directories"), "one picture in the file").at(at)
 }
 
 /// Bytes of a value of a type.

@@ -73,6 +73,8 @@ pub(super) struct Layout {
     pub(super) little_endian: bool,
     pub(super) compression: Compression,
     pub(super) predictor: Predictor,
+    /// How the picture asks to be turned, 1..=8; samples are as stored.
+    pub(super) orientation: u8,
     rgb: bool,
     chunks: Chunks,
     /// Of the strips or tiles: offset and length.
@@ -113,10 +115,13 @@ impl Layout {
         if directory.number(tag::FILL_ORDER, Some(1))? != 1 {
             return of("fill order 2".to_owned(), "1");
         }
-        let orientation = directory.number(tag::ORIENTATION, Some(1))?;
-        if orientation != 1 {
-            return of(format!("orientation {orientation}"), "1, row 0 at the top and column 0 at the left");
-        }
+        let orientation = match directory.number(tag::ORIENTATION, Some(1))? {
+            0 => 1,
+            stated => match u8::try_from(stated) {
+                Ok(stated @ 1..=8) => stated,
+                _ => return Err(Error::malformed(format!("orientation {stated}"), "1 to 8").at(at)),
+            },
+        };
         let planar = match directory.number(tag::PLANAR_CONFIGURATION, Some(1))? {
             1 => false,
             2 => stored > 1,
@@ -137,6 +142,7 @@ impl Layout {
             little_endian,
             compression,
             predictor,
+            orientation,
             rgb,
             chunks,
             places,

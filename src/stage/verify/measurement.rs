@@ -1,9 +1,10 @@
-//! Is a measurement whole and undamaged, and does it hold what its archive holds?
+//! A measurement: every chunk decoded, L* codes worked out again, and compared with an archive.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
 
+use super::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
 use crate::archive::Source;
 use crate::color::Remarkable;
 use crate::error::{Error, Result};
@@ -12,6 +13,7 @@ use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::store::gather::{self, Images};
 use crate::store::measurement::{Measurement, SampleArray};
+use crate::store::metadata::OLDEST_FORMAT;
 
 /// What was found.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -28,6 +30,10 @@ pub struct Report {
     pub different: Option<u64>,
     /// Images with such samples, (view, light): the first of them.
     pub different_images: Vec<(usize, usize)>,
+    /// What else is wrong, or has to be done.
+    pub findings: Vec<Finding>,
+    /// What could not be told.
+    pub notes: Vec<String>,
 }
 
 /// A chunk that is not as it should be.
@@ -49,6 +55,9 @@ pub struct Damage {
 const NAMED_IMAGES: usize = 20;
 
 /// Reads all of a measurement and, where a source is given, all of its archive.
+///
+/// # Errors
+/// An archive of another shape, and those of the operating system; what is damaged is reported.
 pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Context<'_>) -> Result<Report> {
     let description = measurement.description();
     if let Some(source) = source {
@@ -86,6 +95,7 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
         different: source.map(|_| different.into_inner()),
         ..Report::default()
     };
+    other_findings(measurement, &mut report)?;
     for (damaged, remarkable, images) in views {
         report.damaged.extend(damaged);
         report.samples += remarkable;
@@ -93,6 +103,22 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
     }
     report.different_images.truncate(NAMED_IMAGES);
     Ok(report)
+}
+
+/// What does not lie in single chunks.
+fn other_findings(measurement: &Measurement, report: &mut Report) -> Result<()> {
+    let findings = &mut report.findings;
+    kept(measurement.check_coordinates(), "angle coordinates", findings)?;
+    if measurement.format() == OLDEST_FORMAT {
+        report.notes.push(OLDEST_NOTE.to_owned());
+    } else if !measurement.is_finished()? {
+        if report.views_missing.is_empty() {
+            findings.push(unfinished(measurement.path()));
+        }
+    } else {
+        consolidated(measurement.path(), measurement.is_consolidated(), findings)?;
+    }
+    Ok(())
 }
 
 fn expect_same_shape(measurement: &Measurement, source: &dyn Source) -> Result<()> {
@@ -141,6 +167,13 @@ fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, R
         Ok((stored == expected, remarkable))
     };
     if let Ok((true, found)) = check(whole) {
+        // Each chunk is intact, but the view may be another one.
+        if let Some(array) = measurement.exchanged(view)? {
+            let file = measurement.shard_path(array, view, whole).display().to_string();
+            let what =
+                "its checksum is not the one that was kept: the shard of another view, or store".to_owned();
+            damaged.push(Damage { array: array.name(), view, texel: [0, 0], file, what });
+        }
         return Ok((damaged, found));
     }
     for window in measurement.chunk_windows() {

@@ -1,0 +1,226 @@
+//! Is a pyramid whole and undamaged? Its description and its viewer follow from the recipe, and every tile is decoded.
+
+use std::path::Path;
+
+use btfkit_formats::{Limits, picture};
+use rayon::prelude::*;
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::place::Place;
+use super::pyramid::Pyramid;
+use super::{Encoding, TILE_SIDES, page};
+use crate::error::{Error, Result};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::shape::Size;
+use crate::stage::verify::Report;
+use crate::store::mapped::MappedFile;
+use crate::store::metadata;
+use crate::store::recognise::PYRAMID_FOLDER;
+
+/// The member of the state of a finished pyramid that holds the checksums of its tiles.
+pub(super) const CHECKSUMS: &str = "checksums";
+
+/// Longest side of a picture.
+const MOST_SIDE: usize = 1 << 24;
+
+/// Digits of a checksum.
+const DIGITS: usize = 8;
+
+const ANEW: &str =
+    "delete this file and run the command that made the pyramid again, which writes what is missing";
+
+/// The recipe of a pyramid, as far as its tiles follow from it; the seal covers all of it.
+#[derive(Deserialize)]
+struct Recipe {
+    source: Source,
+    tiles: Tiles,
+    tile_side: usize,
+    overlap: usize,
+}
+
+#[derive(Deserialize)]
+struct Source {
+    size: Option<[usize; 2]>,
+    /// x, y, width, height.
+    window: Option<[i64; 4]>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Tiles {
+    Png,
+    Jpeg(u8),
+}
+
+impl Recipe {
+    fn pyramid(&self) -> Option<Pyramid> {
+        let [height, width] = match (self.source.window, self.source.size) {
+            (Some([_, _, width, height]), _) => [usize::try_from(height).ok()?, usize::try_from(width).ok()?],
+            (None, size) => size?,
+        };
+        let sound = [height, width].iter().all(|side| (1..=MOST_SIDE).contains(side))
+            && TILE_SIDES.contains(&self.tile_side)
+            && self.overlap <= self.tile_side / 2;
+        let size = Size::new(height, width);
+        sound.then_some(Pyramid { size, side: self.tile_side, overlap: self.overlap })
+    }
+
+    fn encoding(&self) -> Encoding {
+        match self.tiles {
+            Tiles::Png => Encoding::Png,
+            Tiles::Jpeg(quality) => Encoding::Jpeg(quality),
+        }
+    }
+}
+
+/// Checksums of the tiles: for each level, [`DIGITS`] hexadecimal digits for each row of tiles.
+pub(super) fn checksums(pyramid: &Pyramid, place: &Place) -> Result<Vec<String>> {
+    let of_level = |level: u32| {
+        let rows = pyramid.grid(pyramid.level(level)).height;
+        let sums: Result<Vec<String>> =
+            (0..rows).into_par_iter().map(|row| checksum(pyramid, place, level, row)).collect();
+        Ok(sums?.concat())
+    };
+    (0..=pyramid.top()).map(of_level).collect()
+}
+
+fn checksum(pyramid: &Pyramid, place: &Place, level: u32, row: usize) -> Result<String> {
+    let columns = pyramid.grid(pyramid.level(level)).width;
+    let mut sum = 0;
+    for column in 0..columns {
+        sum = crc32c::crc32c_append(sum, open(&place.tile(level, row, column))?.as_ref());
+    }
+    Ok(format!("{sum:08x}"))
+}
+
+fn open(path: &Path) -> Result<MappedFile> {
+    MappedFile::open(path).map_err(|error| match error.kind() {
+        _ if metadata::is_absent(&error) => Error::missing(format!("{}: no such tile", path.display()))
+            .hint("run the command that makes the pyramid again; it goes on where it stopped"),
+        std::io::ErrorKind::InvalidInput => Error::input(format!("{}: {error}", path.display())).hint(ANEW),
+        _ => Error::io("read", path, error),
+    })
+}
+
+/// Reads all of a pyramid: `path` is its description or the folder of its tiles.
+///
+/// # Errors
+/// Where there is none, or its recipe is damaged; and those of the operating system.
+pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
+    let path: std::path::PathBuf = path.components().collect();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let description = match name.strip_suffix(PYRAMID_FOLDER) {
+        Some(stem) => path.with_file_name(format!("{stem}.dzi")),
+        None => path.clone(),
+    };
+    let refused = |what: &str| {
+        Error::input(format!("{}: the recipe of its tiles: {what}", description.display()))
+            .hint("make the pyramid anew: under another name, or with --force")
+    };
+    let state = Place::new(&description, Encoding::Png)?.state()?.ok_or_else(|| {
+        Error::missing(format!("{}: no folder of tiles with a recipe of this program", description.display()))
+    })?;
+    let recipe = state.get("recipe").cloned().unwrap_or_default();
+    let recipe: Recipe = serde_json::from_value(recipe).map_err(|error| refused(&error.to_string()))?;
+    let pyramid = recipe.pyramid().ok_or_else(|| refused("sizes that no pyramid has"))?;
+    let place = Place::new(&description, recipe.encoding())?;
+    let mut report = Report::of("deepzoom");
+    report.checked("size", pyramid.size.to_string());
+    report.checked("levels", (pyramid.top() + 1).to_string());
+    report.checked("tiles", pyramid.tiles().to_string());
+    texts(&pyramid, &place, recipe.encoding(), &mut report)?;
+    let kept = state.get(CHECKSUMS);
+    if kept.is_none() && state.contains_key("format") && report.findings.is_empty() {
+        report.find(
+            CHECKSUMS,
+            format!("{}: none are kept", description.display()),
+            "run the command that makes the pyramid again; it only ends it",
+        );
+    }
+    context.progress.begin("verify", pyramid.tiles(), Counted::Items("tiles"));
+    for level in 0..=pyramid.top() {
+        let grid = pyramid.grid(pyramid.level(level));
+        for row in 0..grid.height {
+            context.check_stop()?;
+            let before = report.findings.len();
+            let looked: Vec<Result<()>> = context.install(|| {
+                (0..grid.width)
+                    .into_par_iter()
+                    .map(|column| tile(&pyramid, &place, level, row, column))
+                    .collect()
+            });
+            context.progress.advance(grid.width as u64);
+            for result in looked {
+                report.keep("tiles", result)?;
+            }
+            // An interrupted pyramid of any size would miss them one by one.
+            if report.findings.iter().filter(|finding| finding.missing).count() > MOST_MISSING {
+                return Ok(report);
+            }
+            if report.findings.len() > before {
+                continue;
+            }
+            let kept = kept.and_then(|kept| kept.get(level as usize)).and_then(Value::as_str);
+            let kept = kept.and_then(|digits| digits.get(row * DIGITS..(row + 1) * DIGITS));
+            let found = report.keep("tiles", checksum(&pyramid, &place, level, row))?;
+            if state.contains_key(CHECKSUMS) && kept != found.as_deref() {
+                let what = format!(
+                    "{}: the checksum of this row of {} tiles is not the one that was kept",
+                    place.tile(level, row, 0).display(),
+                    grid.width
+                );
+                report.find(
+                    "tiles",
+                    what,
+                    "delete these files and run the command that made the pyramid again",
+                );
+            }
+        }
+    }
+    context.progress.end();
+    Ok(report)
+}
+
+/// Missing tiles that are told one by one.
+const MOST_MISSING: usize = 20;
+
+/// Decodes a tile and looks at its size.
+fn tile(pyramid: &Pyramid, place: &Place, level: u32, row: usize, column: usize) -> Result<()> {
+    let path = place.tile(level, row, column);
+    let damaged = |what: String| Error::input(format!("{}: {what}", path.display())).hint(ANEW);
+    let file = open(&path)?;
+    let decoded =
+        picture::decode(file.as_ref(), &Limits::default()).map_err(|error| damaged(error.to_string()))?;
+    let expected = pyramid.tile(pyramid.level(level), row, column).size;
+    let found = Size::new(decoded.height as usize, decoded.width as usize);
+    if found == expected {
+        Ok(())
+    } else {
+        Err(damaged(format!("got a tile of {found}, expected {expected}")))
+    }
+}
+
+/// Compares the description and the viewer with what they follow from.
+fn texts(pyramid: &Pyramid, place: &Place, encoding: Encoding, report: &mut Report) -> Result<()> {
+    let page = page::viewer(pyramid, encoding, &place.name)?;
+    for (path, expected) in [(&place.description, page::description(pyramid, encoding)), (&place.page, page)]
+    {
+        let found = metadata::read_file(path).and_then(|found| {
+            found.ok_or_else(|| {
+                Error::missing(format!("{}: it is not there", path.display()))
+                    .hint("run the command that makes the pyramid again; it goes on where it stopped")
+            })
+        });
+        if report.keep("description", found)?.is_some_and(|found| found != expected.as_bytes()) {
+            let what = format!("{}: not the text that follows from the recipe", path.display());
+            report.find(
+                "description",
+                what,
+                "run the command that makes the pyramid again: it writes this file anew",
+            );
+        }
+    }
+    Ok(())
+}

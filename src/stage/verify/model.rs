@@ -1,0 +1,85 @@
+//! A model: each stage that is done, its arrays against their ranges and against what they follow from.
+
+use serde_json::{Value, json};
+
+use super::{OLDEST_NOTE, Report, consolidated};
+use crate::error::Result;
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::stage::{cluster, normals};
+use crate::store::metadata::OLDEST_FORMAT;
+use crate::store::model::{KIND, Model, Stage};
+
+/// Reads all of a model.
+pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
+    let mut report = Report::new(KIND);
+    context.progress.begin("verify", Stage::ALL.len() as u64, Counted::Items("stages"));
+    for stage in Stage::ALL {
+        context.check_stop()?;
+        match model.stage(stage)? {
+            None => report.checked(stage.name(), "not run"),
+            Some(entry) => {
+                let before = report.findings.len();
+                input(model, stage, entry.get("recipe").unwrap_or(&Value::Null), &mut report)?;
+                context.install(|| of_stage(model, stage, context, &mut report))?;
+                let found = report.findings.len() - before;
+                report.checked(stage.name(), if found == 0 { "whole" } else { "damaged" });
+            }
+        }
+        context.progress.advance(1);
+    }
+    context.progress.end();
+    if model.format() == OLDEST_FORMAT {
+        report.notes.push(OLDEST_NOTE.to_owned());
+    } else {
+        consolidated(model.path(), model.is_consolidated(), &mut report.findings)?;
+    }
+    Ok(report)
+}
+
+/// Whether a stage was run on what the stage before it is now.
+fn input(model: &Model, stage: Stage, recipe: &Value, report: &mut Report) -> Result<()> {
+    let Some((before, member)) = stage.input() else { return Ok(()) };
+    let found = recipe.get(member).unwrap_or(&Value::Null);
+    let Some(expected) = report.keep(stage.name(), model.stage_digest(before))? else { return Ok(()) };
+    if *found != json!(expected) {
+        let what =
+            format!("{}: stage {} is not of this {}", model.path().display(), stage.name(), before.name());
+        report.find(stage.name(), what, &format!("run btf {} on it again, with --force", stage.name()));
+    }
+    Ok(())
+}
+
+fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Report) -> Result<()> {
+    match stage {
+        Stage::Tile => {
+            report.keep("tile_source", model.tile())?;
+            report.keep("triangles", model.triangles())?;
+            report.keep("angle coordinates", model.check_coordinates())?;
+        }
+        Stage::Cluster => {
+            report.keep("report of cluster", model.report::<cluster::Report>(stage))?;
+            report.keep("index", model.index())?;
+            report.keep("centres", model.centres())?;
+            report.keep("representative_texel", model.representative_texels())?;
+            report.keep("distance", model.distance())?;
+            for clusters in report.keep("representatives", model.representative_chunks())?.unwrap_or_default()
+            {
+                context.check_stop()?;
+                let read = model.representatives_of(clusters).and_then(|values| values.decoder());
+                report.keep("representatives", read)?;
+            }
+        }
+        Stage::Normals => {
+            report.keep("report of normals", model.report::<normals::Report>(stage))?;
+            report.keep("normals", model.normals())?;
+        }
+        Stage::Fit => {
+            report.keep("mrf", model.surface())?;
+        }
+        Stage::Appearance => {
+            report.keep("appearance", model.appearance())?;
+        }
+    }
+    Ok(())
+}

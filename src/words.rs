@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 /// `1 view`, `9 views`: a number and what it counts, whose plural follows the rules of English.
-pub fn counted<N: Display + PartialEq + From<u8>>(number: N, thing: &str) -> String {
+pub fn counted<N: Copy + Display + PartialEq + From<u8>>(number: N, thing: &str) -> String {
     if number == N::from(1) { format!("{number} {thing}") } else { format!("{number} {}", plural(thing)) }
 }
 

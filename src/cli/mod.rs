@@ -78,6 +78,7 @@ struct Common {
     threads: Option<u32>,
     /// Memory to use, such as 512MiB, 1.5GiB or 2GB
     #[arg(long, global = true, default_value = "2GiB", value_parser = bytes::parse_bytes, value_name = "SIZE")]
+    #[arg(allow_hyphen_values = true)]
     memory: u64,
     /// How to tell progress
     #[arg(long, global = true, value_enum, default_value = "auto")]

@@ -23,7 +23,7 @@ pub(super) struct Sample {
     /// Which material
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
-    /// Size of its images, WIDTHxHEIGHT
+    /// Size of its images, WIDTHxHEIGHT, each from 1 to 65536
     #[arg(long, default_value = "128x128", allow_hyphen_values = true)]
     size: Size,
     /// Number of views; 81 are those of UBO2003

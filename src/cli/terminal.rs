@@ -89,8 +89,8 @@ mod tests {
 
     #[test]
     fn lines_break_between_words_and_go_on_under_their_text() {
-        let text = "clusters  256 after 12 passes; mean 0.5\nbtf: one two three four five six\n  a hint of many words too";
-        let expected = "clusters  256 after 12\n          passes; mean 0.5\nbtf: one two three four\n  five six\n  a hint of many words\n  too";
+        let text = "clusters  256 after 12 passes; mean\n          0.5\nbtf: one two three four five six\n  a hint of many words too";
+        let expected = "clusters  256 after 12\n          passes; mean\n          0.5\nbtf: one two three four\n  five six\n  a hint of many words\n  too";
         assert_eq!(wrapped(text, Some(24)), expected);
         assert_eq!(wrapped(text, None), text);
         assert_eq!(wrapped(text, Some(200)), text);

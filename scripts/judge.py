@@ -4,13 +4,13 @@
         [--image [SOURCE=]PICTURE.png --light THETA,PHI --view THETA,PHI]...
 
 Prints one line per check and exits with 1 if any failed. SOURCE (measurement, model or enlarged) is needed only where
-two of the stores have the size of the picture. Needs zarr 3, numpy and pillow.
+two of the stores have the size of the picture. Needs zarr 3, xarray, numpy and pillow.
 """
 
 import argparse
 import sys
 
-from judge import Report, Store, clusters, directions, enlarged, field, layout, measurement, normals, picture, tile
+from judge import Report, Store, clusters, directions, enlarged, field, layout, measurement, normals, opened, picture, tile
 
 
 def pair(text):
@@ -39,6 +39,9 @@ def judge(report, given):
     report.topic(layout.measurement, measured)
     report.topic(layout.model, modelled, measured)
     report.topic(layout.enlarged, grown, modelled)
+    for store in stores.values():
+        report.topic(opened.opened, store)
+    report.topic(opened.selected, measured)
     if given.archive:
         report.topic(measurement.archive, measured, given.archive)
     report.topic(measurement.luminance, measured)

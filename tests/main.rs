@@ -21,6 +21,8 @@ mod coherent_example;
 mod command_line;
 #[path = "behaviour/curve.rs"]
 mod curve;
+#[path = "behaviour/damaged_stores.rs"]
+mod damaged_stores;
 #[path = "behaviour/deepzoom.rs"]
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]

@@ -174,6 +174,25 @@ impl NumberPrefix {
     }
 }
 
+/// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by half:
+/// `7,5`, `7p5`, `4.5e+01`, `1.2.3`.
+pub(crate) fn goes_on(rest: &str) -> bool {
+    let mut chars = rest.chars();
+    let Some(mark) = chars.next().filter(|mark| ",.'pPeE\u{b7}\u{2019}".contains(*mark)) else {
+        return false;
+    };
+    let after = chars.as_str();
+    let after = if "eE".contains(mark) { after.strip_prefix(['+', '-']).unwrap_or(after) } else { after };
+    after.starts_with(|c: char| c.is_ascii_digit())
+}
+
+/// The same for names without a pattern, where a dash, an underscore or a blank may stand for the point as well:
+/// digits there belong to no label.
+pub(crate) fn digits_are_left(rest: &str) -> bool {
+    let after = rest.strip_prefix(['_', '-', ' ']);
+    goes_on(rest) || after.is_some_and(|after| after.starts_with(|c: char| c.is_ascii_digit()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +225,19 @@ mod tests {
         ] {
             let error = Forms::of(&fields(names)).unwrap_err();
             assert!(error.contains(reason), "{names}: {error}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_go_on() {
+        for rest in [",5", "p5", "P5_x", "e+01", "E1", ".3", "'5", "·5"] {
+            assert!(goes_on(rest) && digits_are_left(rest), "{rest}");
+        }
+        for rest in ["_5", "-5", " 5"] {
+            assert!(!goes_on(rest) && digits_are_left(rest), "{rest}");
+        }
+        for rest in ["", "_pl5", ".png", "pl30", "po5", "ev2", "p", "--5", "x5", "_"] {
+            assert!(!digits_are_left(rest), "{rest}");
         }
     }
 

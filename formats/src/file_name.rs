@@ -30,6 +30,49 @@ pub(crate) fn inside_folder(path: &str) -> Option<String> {
     (unsafe_reason(&joined).is_none() && !kept.ends_with(['/', '\\'])).then_some(joined)
 }
 
+/// All parts of a path that a list names, separated by `/`: without a drive, and what `..` climbs out of. They are
+/// compared with the ends of paths that are there, and lead nowhere.
+pub(crate) fn parts_of(path: &str) -> String {
+    let mut kept: Vec<&str> = Vec::new();
+    for part in path.split(['/', '\\']) {
+        match part {
+            "" | "." => {}
+            ".." => kept.clear(),
+            drive
+                if kept.is_empty()
+                    && matches!(drive.as_bytes(), [letter, b':'] if letter.is_ascii_alphabetic()) => {}
+            other => kept.push(other),
+        }
+    }
+    kept.join("/")
+}
+
+/// Whether one name comes before another where runs of digits count as numbers, however many zeros they begin with.
+pub fn natural_order(a: &str, b: &str) -> std::cmp::Ordering {
+    let (mut a, mut b) = (a, b);
+    loop {
+        let ((a_text, a_rest), (b_text, b_rest)) = (until(a, true), until(b, true));
+        let ((a_digits, a_left), (b_digits, b_left)) = (until(a_rest, false), until(b_rest, false));
+        let number = |digits: &str| digits.trim_start_matches('0').to_owned();
+        let (a_number, b_number) = (number(a_digits), number(b_digits));
+        let order = a_text
+            .cmp(b_text)
+            .then_with(|| a_digits.is_empty().cmp(&b_digits.is_empty()).reverse())
+            .then_with(|| a_number.len().cmp(&b_number.len()))
+            .then_with(|| a_number.cmp(&b_number));
+        if order.is_ne() || (a_left.is_empty() && b_left.is_empty()) {
+            return order;
+        }
+        (a, b) = (a_left, b_left);
+    }
+}
+
+/// What comes before the first digit (or before the first character that is none), and the rest.
+fn until(text: &str, digit: bool) -> (&str, &str) {
+    let at = text.find(|c: char| c.is_ascii_digit() == digit).unwrap_or(text.len());
+    text.split_at_checked(at).unwrap_or((text, ""))
+}
+
 /// The first name that was there before: its positions, earlier and later.
 pub(crate) fn repeated<'a>(names: impl IntoIterator<Item = &'a str>) -> Option<(usize, usize)> {
     let mut seen = HashMap::new();
@@ -66,6 +109,32 @@ mod tests {
         for path in ["", ".", "..", "/", "/x/..", "x/", "a\0.png", "c:a.png"] {
             assert_eq!(inside_folder(path), None, "{path:?}");
         }
+    }
+
+    #[test]
+    fn the_folders_of_a_foreign_path_are_kept_to_compare() {
+        for (path, parts) in [
+            ("a.png", "a.png"),
+            ("C:\\x\\jpeg-exports\\a.png", "x/jpeg-exports/a.png"),
+            ("/home/me/./a.png", "home/me/a.png"),
+            ("x/../../y/a.png", "y/a.png"),
+            ("\\\\host\\share\\a.png", "host/share/a.png"),
+        ] {
+            assert_eq!(parts_of(path), parts, "{path:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        let sorted = ["a", "a1", "a02b", "a2c", "a10", "a10.5", "a10.10", "b1", "é"];
+        for (at, first) in sorted.iter().enumerate() {
+            for (later, second) in sorted.iter().enumerate() {
+                let found = natural_order(first, second);
+                assert_eq!(found, at.cmp(&later), "{first} {second}");
+            }
+        }
+        assert!(natural_order("p1.png", "p001.png").is_eq());
+        assert!(natural_order("99999999999999999999999", "100000000000000000000000").is_lt());
     }
 
     #[test]

@@ -69,6 +69,7 @@ mod request;
 pub mod rti;
 mod samples;
 pub mod table;
+pub mod text;
 pub mod ubo2003;
 pub mod utia;
 pub mod zip;

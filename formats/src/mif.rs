@@ -55,8 +55,8 @@ impl Mif {
     pub fn open(bytes: &[u8], options: &Options, limits: &Limits) -> Result<Mif> {
         let chunks = Chunks::read(bytes, limits)?;
         let description = match chunks.xml {
-            Some((text, at)) => xml::parse(text, limits)
-                .and_then(|tree| description::read(&tree, options))
+            Some((bytes, at)) => xml::text(bytes, limits)
+                .and_then(|text| description::read(&xml::parse(&text, limits)?, options))
                 .map_err(|e| e.at(at))?,
             None => Description::of_images(options.order, chunks.images.len())?,
         };

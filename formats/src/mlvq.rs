@@ -48,8 +48,8 @@ impl Database {
     /// # Errors
     /// [`ErrorKind::Malformed`](crate::ErrorKind::Malformed) for whatever breaks the format, bytes after the last table included;
     /// [`ErrorKind::Unsupported`](crate::ErrorKind::Unsupported) for several materials, other numbers of directions, HDR or other
-    /// codings; [`ErrorKind::Argument`](crate::ErrorKind::Argument) where `known` speaks of bytes that are not zero or of values that
-    /// are neither end; [`ErrorKind::Limit`](crate::ErrorKind::Limit) for too many pixels.
+    /// codings; [`ErrorKind::Argument`](crate::ErrorKind::Argument) where `known` contradicts a table: places that it has not, values that
+    /// are neither end of its range, or not that of a byte that is not ambiguous; [`ErrorKind::Limit`](crate::ErrorKind::Limit) for too many pixels.
     pub fn open(bytes: &[u8], known: &ZeroBytes, limits: &Limits) -> Result<Database> {
         let mut reader = Reader::new(bytes);
         let header = Header::read(&mut reader, limits)?;

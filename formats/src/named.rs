@@ -7,5 +7,6 @@
 mod pattern;
 mod recognise;
 
+pub use crate::file_name::natural_order;
 pub use pattern::Pattern;
 pub use recognise::recognise;

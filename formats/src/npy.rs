@@ -8,5 +8,5 @@ mod archive;
 mod directions;
 mod header;
 
-pub use archive::{Archive, Beside, header, sample_bytes};
+pub use archive::{Archive, Beside, channels, channels_file, header, sample_bytes};
 pub use directions::{directions, directions_file};

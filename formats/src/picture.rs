@@ -16,6 +16,7 @@
 
 mod alpha;
 pub mod exr;
+mod foreign;
 mod hdr;
 pub(crate) mod orientation;
 pub mod png;
@@ -23,6 +24,7 @@ mod size;
 mod tiff;
 mod wavelength;
 
+pub use foreign::foreign;
 pub use wavelength::wavelength_nm;
 
 use crate::{Error, ErrorKind, Limits, Result, SampleType, Samples, jpeg};
@@ -189,6 +191,10 @@ pub fn decode_with(bytes: &[u8], options: &DecodeOptions, limits: &Limits) -> Re
 }
 
 fn require_format(bytes: &[u8]) -> Result<Format> {
+    // A Canon raw file begins as a TIFF does.
+    if let Some((what, way_out)) = foreign("", bytes) {
+        return Err(Error::new(ErrorKind::Unsupported, what, format!("a picture that is read; {way_out}")));
+    }
     recognise(bytes).ok_or_else(|| {
         let start = bytes.get(..bytes.len().min(8)).unwrap_or_default();
         Error::new(

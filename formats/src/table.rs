@@ -4,14 +4,15 @@
 //! `theta_v`, `phi_v` of the view, all in degrees. A direction may be a vector `x_i`, `y_i`, `z_i` (`x_v`
 //! ...) of any length instead. Without columns of the view all pictures have the frontal one. Other columns
 //! are ignored, so are lines that start with `#` and empty ones. Columns are separated by comma, semicolon or
-//! tab; numbers have a decimal point. Frame as everywhere: x right, y up, z out of the surface, phi
+//! tab; numbers have a decimal point; the text is UTF-8, or UTF-16 with a byte order mark. Frame as everywhere: x right, y up, z out of the surface, phi
 //! counter-clockwise from +x.
 //!
 //! `file` is a path inside the table's folder. Of a path that is absolute, has a drive or climbs by `..`
 //! (a table from another machine) the last part counts; so a table never reaches out of its folder.
 
 use crate::fields::{Field, Forms};
-use crate::file_name::{inside_folder, repeated};
+use crate::file_name::{inside_folder, parts_of, repeated};
+use crate::text::utf8;
 use crate::{Error, ErrorKind, Limits, Pair, Result};
 
 /// The rows of a table, in its order.
@@ -28,6 +29,8 @@ pub struct Table {
 pub struct Row {
     /// Path inside the table's folder, parts separated by `/`.
     pub file: String,
+    /// All folders that the table names and the file, separated by `/`, without a drive and what `..` climbs out of.
+    pub path: String,
     /// Its directions.
     pub pair: Pair,
     /// Line in the table, the first is 1.
@@ -53,6 +56,8 @@ struct Columns {
 /// more or fewer columns than the header, a number that is none or out of range, a file without a usable name or twice.
 /// [`ErrorKind::Limit`]: more rows than [`Limits::max_entries`].
 pub fn read(bytes: &[u8], limits: &Limits) -> Result<Table> {
+    let text = utf8(bytes)?;
+    let bytes = &*text;
     let (mut reader, columns) = open(bytes)?;
     let mut rows: Vec<Row> = Vec::new();
     for record in reader.byte_records() {
@@ -126,8 +131,9 @@ impl Columns {
         };
         let cell = |column: usize| record.get(column).unwrap_or_default();
         let given = cell(self.file);
-        let file = std::str::from_utf8(given).ok().and_then(inside_folder);
-        let Some(file) = file else {
+        let given_text = std::str::from_utf8(given).ok();
+        let named = given_text.and_then(|text| Some((inside_folder(text)?, parts_of(text))));
+        let Some((file, path)) = named else {
             let found = format!("{:?}", String::from_utf8_lossy(given));
             return Err(wrong(FILE, found, "the name of a file in the table's folder, as UTF-8"));
         };
@@ -136,7 +142,11 @@ impl Columns {
             let text = String::from_utf8_lossy(cell(column));
             let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
             let Some(number) = number else {
-                return Err(wrong(&field.name(), format!("{text:?}"), "a decimal number"));
+                return Err(wrong(
+                    &field.name(),
+                    format!("{text:?}"),
+                    "a number, with a decimal point if it has a fraction",
+                ));
             };
             values.push((field, number));
         }
@@ -145,7 +155,7 @@ impl Columns {
             let found = value(field).map(|value| value.to_string()).unwrap_or_default();
             wrong(&field.name(), found, expected)
         })?;
-        Ok(Row { file, pair, line })
+        Ok(Row { file, path, pair, line })
     }
 }
 

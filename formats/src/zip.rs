@@ -4,6 +4,7 @@
 //! programs see two different archives or make one write outside its folder; [`ZipIndex::read`] never
 //! returns bytes whose size and CRC-32 do not match the directory.
 
+mod cp437;
 mod index;
 mod name;
 mod writer;

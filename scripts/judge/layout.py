@@ -3,7 +3,8 @@
 import numpy as np
 
 SHARD_BYTES = 256 << 20
-WITH_UNITS = {"reflectance", "luminance", "view_direction", "light_direction", "distance"}
+WITH_UNITS = {"reflectance", "luminance", "view_direction", "light_direction", "distance",
+              "view_theta", "view_phi", "light_theta", "light_phi"}
 
 
 def arrays(report, store, expected):
@@ -23,7 +24,7 @@ def arrays(report, store, expected):
 
 def attributes(report, store):
     got = [store.attributes.get(name) for name in ("kind", "format")]
-    report.equal(f"attributes of the {store.kind}", got, [store.kind, 1])
+    report.equal(f"attributes of the {store.kind}", got, [store.kind, 2])
     report.check(f"version of the {store.kind}", bool(store.attributes.get("version")), store.attributes.get("version"))
 
 
@@ -39,8 +40,11 @@ def sharded(report, found):
 
 
 def direction_arrays(views, lights):
-    return {"view_direction": ((views, 2), "float64", "view angle"),
-            "light_direction": ((lights, 2), "float64", "light angle")}
+    arrays = {}
+    for name, count in (("view", views), ("light", lights)):
+        arrays[f"{name}_direction"] = ((count, 2), "float64", f"{name} angle")
+        arrays[f"{name}_theta"] = arrays[f"{name}_phi"] = ((count,), "float64", name)
+    return arrays
 
 
 def measurement(report, store):
@@ -81,7 +85,7 @@ def model(report, store, measured):
         "representatives": ((clusters, views, lights, channels), "uint8", "cluster view light channel"),
         "representative_texel": ((clusters, 2), "uint32", "cluster row_column"),
         "distance": ((clusters, clusters), "float32", "cluster cluster_other"),
-        **{f"{name}_triangles": (store.array(f"{name}_triangles").shape[:1] + (3,), "uint16", "triangle corner")
+        **{f"{name}_triangles": (store.array(f"{name}_triangles").shape[:1] + (3,), "uint16", f"{name}_triangle corner")
            for name in ("view", "light")},
         **direction_arrays(views, lights),
         **field_arrays(stages["fit"]["report"]),
@@ -113,22 +117,22 @@ def appearance(report, store):
 def field_arrays(fit):
     """The arrays under `mrf/`."""
     flat, c = fit["mrf"] == "2d", 2 if fit["field"] == "slopes" else 3
-    square = ((c, c), "float64", "channel channel_other")
+    square = ((c, c), "float64", "field_channel field_channel_other")
     expected = {
-        "mrf/mean": ((c,), "float64", "channel"),
+        "mrf/mean": ((c,), "float64", "field_channel"),
         "mrf/covariance": square,
         "mrf/gain": ((len(fit["levels"]),), "float64", "level"),
     }
     if flat:
-        expected["mrf/transform"] = ((c, c), "float64", "component channel")
+        expected["mrf/transform"] = ((c, c), "float64", "component field_channel")
     if fit["marginals"]:
         expected["mrf/marginals"] = ((129, 129, 2), "float32", "z1 z2 xy")
     for k, level in enumerate(fit["levels"]):
         eta = level["eta"]
         expected |= {
             f"mrf/level_{k}/neighbourhood": ((eta, 2), "int32", "site dy_dx"),
-            f"mrf/level_{k}/gamma": ((c, eta if flat else c * eta), "float64", "channel coefficient"),
-            f"mrf/level_{k}/sigma": ((c,), "float64", "channel") if flat else square,
+            f"mrf/level_{k}/gamma": ((c, eta if flat else c * eta), "float64", "field_channel coefficient"),
+            f"mrf/level_{k}/sigma": ((c,), "float64", "field_channel") if flat else square,
         }
     return expected
 

@@ -1,13 +1,13 @@
 //! Which file is the image of which directions: by a table, a light list, or the names themselves.
 
-use std::collections::HashMap;
 use std::path::Path;
 
-use btfkit_formats::named::{self, Pattern};
+use btfkit_formats::named::{self, Pattern, natural_order};
 use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Limits, Pair, rti, table, ubo2003};
 
 use super::files::Files;
-use super::{Options, read_beside};
+use super::matching::{Listed, Matcher};
+use super::{Options, list_of_bounded_size, read_beside};
 use crate::error::{Error, Kind, Result};
 
 /// A complete set of images, how it was found, and what had to be assumed.
@@ -30,17 +30,34 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
     if let Some(path) = &options.table {
         let table = table::read(&read_beside(path)?, limits)
             .map_err(|error| Error::from(error).context(path.display()))?;
-        let rows = table.rows.iter().map(|row| (row.file.as_str(), row.pair)).collect();
-        let catalogue = complete(match_files(path, files, rows)?)?;
-        let assumptions = if table.has_view { Vec::new() } else { vec![FRONTAL.to_owned()] };
+        let rows = table
+            .rows
+            .iter()
+            .map(|row| (Listed { file: &row.file, path: &row.path }, row.pair, row.line as usize))
+            .collect();
+        let (pairs, remark) = match_files(path, files, rows)?;
+        let catalogue = complete(pairs)?;
+        let mut assumptions = if table.has_view { Vec::new() } else { vec![FRONTAL.to_owned()] };
+        assumptions.extend(remark);
         return Ok(Found { catalogue, format: "pictures with a table".to_owned(), assumptions });
     }
     if let Some(text) = &options.pattern {
         let pattern = Pattern::parse(text)?;
         return by_pattern(&pattern, files, complete);
     }
-    if let Some(list) = files.names().position(|name| has_extension(name, "lp")) {
-        return by_light_list(files, list, limits, complete);
+    let lists: Vec<usize> = match files.named_list() {
+        Some(named) => vec![named],
+        None => (0..files.len()).filter(|&number| has_extension(files.name(number), "lp")).collect(),
+    };
+    if !lists.is_empty() {
+        return by_light_lists(files, &lists, limits, complete);
+    }
+    if let Some(name) = files.names().find(|name| ubo2003::half_read(name)) {
+        let found = format!("{name}: digits that belong to no label are left over behind an angle");
+        return Err(Error::input(found).context(archive.display()).hint(
+            "angles have a decimal point (tl7.5); --pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}.png' says what \
+             digits do not matter, --table FILE.csv lists the angles",
+        ));
     }
     let pairs: Vec<Option<Pair>> = files.names().map(of_ubo2003_name).collect();
     if pairs.iter().any(Option::is_some) {
@@ -51,6 +68,9 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         });
     }
     let pattern = named::recognise(files.names()).map_err(|error| {
+        if let Some(foreign) = files.foreign() {
+            return Error::input(foreign).context(archive.display());
+        }
         Error::from(error).context(archive.display()).hint(
             "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' \
              says where the angles stand, --table FILE.csv lists them, `btf import --help` explains",
@@ -76,50 +96,100 @@ fn of_ubo2003_name(name: &str) -> Option<Pair> {
     ubo2003::parse_name(name).map(|image| Pair { view: image.view, light: image.light })
 }
 
-fn by_light_list(
+/// What a light list says: the pair of each file, and what had to be assumed.
+struct Lights {
+    pairs: Vec<Option<Pair>>,
+    assumptions: Vec<String>,
+}
+
+/// The set that the light lists of an archive describe. Several may be there if they say the same.
+fn by_light_lists(
     files: &Files,
-    list: usize,
+    lists: &[usize],
     limits: &Limits,
     complete: impl Fn(Vec<Option<Pair>>) -> Result<Catalogue>,
 ) -> Result<Found> {
-    let name = files.name(list);
-    let lights = rti::read_lp(&files.bytes(list)?, limits).map_err(|error| error.in_entry(name))?;
-    let frontal = |light: Angles| Pair { view: Angles::FRONTAL, light };
-    let named: Option<Vec<(&str, Pair)>> =
-        lights.lamps.iter().map(|lamp| Some((lamp.file.as_deref()?, frontal(lamp.light)))).collect();
-    let pairs = match named {
-        Some(rows) => match_files(Path::new(name), files, rows)?,
-        None => in_order(name, files, lights.lamps.iter().map(|lamp| frontal(lamp.light)).collect())?,
-    };
-    let mut assumptions = vec![FRONTAL.to_owned()];
-    assumptions.extend(lights.warnings);
+    let mut read: Option<(usize, Result<Lights>)> = None;
+    for &list in lists {
+        let lights = read_light_list(files, list, limits);
+        let Some((first, earlier)) = &read else {
+            read = Some((list, lights));
+            continue;
+        };
+        let same = matches!((earlier, &lights), (Ok(a), Ok(b)) if a.pairs == b.pairs);
+        if !same {
+            let found =
+                format!("{} and {} are two light lists that differ", files.name(*first), files.name(list));
+            return Err(Error::input(found).hint(format!(
+                "import the one that is meant, with the pictures beside it: btf import {:?}",
+                files.name(list)
+            )));
+        }
+    }
+    let Some((_, lights)) = read else { return Err(Error::internal("no light list")) };
+    let Lights { pairs, mut assumptions } = lights?;
+    assumptions.insert(0, FRONTAL.to_owned());
     Ok(Found { catalogue: complete(pairs)?, format: "RTI light list (.lp)".to_owned(), assumptions })
 }
 
-/// The pair of each file that a list names; the list lies at `list`, its paths are relative to that folder.
-fn match_files(list: &Path, files: &Files, rows: Vec<(&str, Pair)>) -> Result<Vec<Option<Pair>>> {
-    let folder = list.parent().unwrap_or(Path::new(""));
-    let by_path: HashMap<&Path, usize> =
-        files.names().enumerate().map(|(number, name)| (Path::new(name), number)).collect();
-    let mut pairs = vec![None; files.len()];
-    for (file, pair) in rows {
-        // Beside the list, or (in a zip, or for a table that lies elsewhere) anywhere under that name.
-        let number = by_path.get(folder.join(file).as_path()).copied().or_else(|| {
-            let mut ends = files.names().enumerate().filter(|(_, name)| Path::new(name).ends_with(file));
-            ends.next().filter(|_| ends.next().is_none()).map(|(number, _)| number)
-        });
-        let number = number
-            .ok_or_else(|| Error::input(format!("{}: lists {file:?}, which is not there", list.display())))?;
-        pairs[number] = Some(pair);
-    }
-    Ok(pairs)
+fn read_light_list(files: &Files, list: usize, limits: &Limits) -> Result<Lights> {
+    let name = files.name(list);
+    let bytes = files.bytes(list)?;
+    list_of_bounded_size(name, &bytes)?;
+    let lights = rti::read_lp(&bytes, limits).map_err(|error| error.in_entry(name))?;
+    let frontal = |light: Angles| Pair { view: Angles::FRONTAL, light };
+    let named: Option<Vec<(Listed<'_>, Pair, usize)>> = lights
+        .lamps
+        .iter()
+        .map(|lamp| {
+            let listed = Listed { file: lamp.file.as_deref()?, path: &lamp.path };
+            Some((listed, frontal(lamp.light), lamp.line))
+        })
+        .collect();
+    let (pairs, remark) = match named {
+        Some(rows) => match_files(Path::new(name), files, rows)?,
+        None => in_order(name, files, lights.lamps.iter().map(|lamp| frontal(lamp.light)).collect())?,
+    };
+    Ok(Lights { pairs, assumptions: lights.warnings.into_iter().chain(remark).collect() })
 }
 
-/// Pictures in the order of their names are the lights of a list without names.
-fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<Vec<Option<Pair>>> {
+/// The pair of each file that a list names, and a remark on names that differ; the list lies at `list`.
+fn match_files(
+    list: &Path,
+    files: &Files,
+    rows: Vec<(Listed<'_>, Pair, usize)>,
+) -> Result<(Vec<Option<Pair>>, Option<String>)> {
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let matcher = Matcher::new(files.names());
+    let mut pairs = vec![None; files.len()];
+    let mut lines = vec![0; files.len()];
+    let (mut different, mut example) = (0, None);
+    for (listed, pair, line) in rows {
+        let found = matcher.find(&listed, folder).map_err(|error| error.context(list.display()))?;
+        if pairs[found.number].is_some() {
+            let name = files.name(found.number);
+            let twice =
+                format!("{}: the lines {} and {line} mean {name}", list.display(), lines[found.number]);
+            return Err(Error::input(twice).hint("each picture has one line"));
+        }
+        (pairs[found.number], lines[found.number]) = (Some(pair), line);
+        if let Some(differs) = found.differs {
+            different += 1;
+            let name = Path::new(files.name(found.number)).file_name().unwrap_or_default().to_string_lossy();
+            example.get_or_insert_with(|| format!("{:?} is {name:?}, which differs {differs}", listed.file));
+        }
+    }
+    let remark = example.map(|example| {
+        format!("{different} names in {} are not quite those of the pictures: {example}", list.display())
+    });
+    Ok((pairs, remark))
+}
+
+/// Pictures in the order of the numbers in their names are the lights of a list without names.
+fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<Pair>>, Option<String>)> {
     let mut pictures: Vec<usize> =
         (0..files.len()).filter(|&number| is_picture(files.name(number))).collect();
-    pictures.sort_by_key(|&number| files.name(number));
+    pictures.sort_by(|&a, &b| natural_order(files.name(a), files.name(b)));
     if pictures.len() != lights.len() {
         return Err(Error::input(format!(
             "{list}: got {} lights without names and {} pictures, expected as many",
@@ -127,14 +197,32 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<Vec<Option<P
             pictures.len()
         )));
     }
+    let neighbours = || pictures.iter().zip(pictures.iter().skip(1));
+    let name = |number: usize| files.name(number);
+    if let Some((&a, &b)) = neighbours().find(|&(&a, &b)| natural_order(name(a), name(b)).is_eq()) {
+        let found = format!(
+            "{list}: lights without names, and {} and {}, of which either may be first",
+            name(a),
+            name(b)
+        );
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
+    let ends = pictures.first().zip(pictures.last());
+    let remark = ends.map(|(&first, &last)| {
+        format!(
+            "the list has no names: its lights are those of the pictures in the order of the numbers in their names, from {} to {}",
+            name(first),
+            name(last)
+        )
+    });
     let mut pairs = vec![None; files.len()];
     for (number, pair) in pictures.into_iter().zip(lights) {
         pairs[number] = Some(pair);
     }
-    Ok(pairs)
+    Ok((pairs, remark))
 }
 
-fn is_picture(name: &str) -> bool {
+pub(super) fn is_picture(name: &str) -> bool {
     ["jpg", "jpeg", "png", "tif", "tiff", "hdr", "exr"].iter().any(|e| has_extension(name, e))
 }
 

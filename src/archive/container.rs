@@ -22,6 +22,9 @@ const GROUPS: usize = 8;
 /// The beginning of every `.npy` file.
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
+/// What to do where directions are missing.
+const ORDER: &str = "--order names a published list of directions (ubo81, bonn151, uniform)";
+
 /// A container, and the type that its samples are best kept as where that is not their own.
 pub(super) struct Recognised {
     pub(super) source: Box<dyn Source>,
@@ -33,7 +36,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
     let head = files::read_head(path, HEAD_BYTES)?;
     let mut samples = None;
     let opened = if bonn::recognise(&head).is_some() {
-        Container::open(path, |bytes| {
+        Container::open(path, ORDER, |bytes| {
             let mut how = bonn::OpenOptions::default();
             how.rows = options.rows;
             Ok(Box::new(bonn::Archive::open(bytes, &how, limits)?))
@@ -41,25 +44,30 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
     } else if mlvq::recognise(&head) {
         samples = Some(Type::U8);
         let known = zero_bytes_beside(path)?;
-        Container::open(path, |bytes| Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?)))
-            .map(|container| Container { beside: Some(zero_bytes_place(path)), ..container })
+        let place = zero_bytes_place(path);
+        let way_out = format!(
+            "{} says that; take the line out, or move the file away: a rule then tells the bytes apart",
+            place.display()
+        );
+        Container::open(path, &way_out, |bytes| Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?)))
+            .map(|container| Container { beside: vec![place], ..container })
     } else if big::recognise(&head) {
         let order = order(options)?;
-        Container::open(path, |bytes| {
+        Container::open(path, ORDER, |bytes| {
             let mut how = big::Options::default();
             how.order = order;
             Ok(Box::new(big::Big::open(bytes, &how, limits)?))
         })
     } else if mif::recognise(&head) {
         let order = order(options)?;
-        Container::open(path, |bytes| {
+        Container::open(path, ORDER, |bytes| {
             let mut how = mif::Options::default();
             how.order = order;
             Ok(Box::new(mif::Mif::open(bytes, &how, limits)?))
         })
     } else if head.starts_with(NPY_MAGIC) {
         let beside = directions_beside(path, options, limits)?;
-        Container::open(path, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
+        Container::open(path, ORDER, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
     } else if crate::hdf5::recognise(&head) {
         return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples }));
     } else {
@@ -101,8 +109,14 @@ fn zero_bytes_beside(path: &Path) -> Result<mlvq::ZeroBytes> {
     if !file.is_file() {
         return Ok(mlvq::ZeroBytes::default());
     }
-    let text = String::from_utf8_lossy(&read_beside(&file)?).into_owned();
-    mlvq::ZeroBytes::parse(&text).map_err(|error| Error::from(error).context(file.display()))
+    let bytes = read_beside(&file)?;
+    let text =
+        btfkit_formats::text::utf8(&bytes).map_err(|error| Error::from(error).context(file.display()))?;
+    mlvq::ZeroBytes::parse(&String::from_utf8_lossy(&text)).map_err(|error| {
+        Error::from(error)
+            .context(file.display())
+            .hint("mend the line, or move the file away: a rule then tells the bytes apart")
+    })
 }
 
 /// The directions of `NAME.npy`: `NAME.views.npy` and `NAME.lights.npy`, or a published list that the user names.
@@ -115,7 +129,15 @@ fn directions_beside(path: &Path, options: &Options, limits: &Limits) -> Result<
         let found = npy::directions(&read_beside(&file)?, limits);
         found.map(Some).map_err(|error| Error::from(error).context(file.display()))
     };
-    let mut beside = Beside { views: list("views")?, lights: list("lights")? };
+    let names = path.with_extension("channels.txt");
+    let channels = match names.is_file() {
+        true => {
+            let found = npy::channels(&read_beside(&names)?);
+            Some(found.map_err(|error| Error::from(error).context(names.display()))?)
+        }
+        false => None,
+    };
+    let mut beside = Beside { views: list("views")?, lights: list("lights")?, channels };
     if let Some(name) = &options.order {
         let published = directions::published(name).ok_or_else(|| {
             Error::new(crate::Kind::Usage, format!("got the list {name:?}, expected ubo81 or bonn151"))
@@ -133,27 +155,25 @@ struct Container {
     path: PathBuf,
     file: MappedFile,
     images: Box<dyn Images>,
-    /// A file beside it that its samples depend on, if it is there.
-    beside: Option<PathBuf>,
+    /// Files beside it that its samples depend on, those that are there.
+    beside: Vec<PathBuf>,
 }
 
 impl Container {
-    /// Maps a file and opens it by `open`.
+    /// Maps a file and opens it by `open`; `way_out` is what to do where more must be said of the file, or less.
     fn open(
         path: &Path,
+        way_out: &str,
         open: impl FnOnce(&[u8]) -> btfkit_formats::Result<Box<dyn Images>>,
     ) -> Result<Self> {
+        files::regular(path)?;
         let file = MappedFile::open(path).map_err(|error| Error::io("read", path, error))?;
         let images = open(file.as_ref()).map_err(|error| {
-            let missing = error.kind() == ErrorKind::Argument;
+            let asked = error.kind() == ErrorKind::Argument;
             let error = Error::from(error).context(path.display());
-            if missing {
-                error.hint("--order names a published list of directions (ubo81, bonn151, uniform)")
-            } else {
-                error
-            }
+            if asked { error.hint(way_out) } else { error }
         })?;
-        Ok(Self { path: path.to_owned(), file, images, beside: None })
+        Ok(Self { path: path.to_owned(), file, images, beside: Vec::new() })
     }
 }
 
@@ -178,10 +198,10 @@ impl Source for Container {
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
-        let digest = digest_of(&self.path, context)?;
-        match self.beside.as_deref().filter(|beside| beside.is_file()) {
-            Some(beside) => Ok(format!("{digest} {}", digest_of(beside, context)?)),
-            None => Ok(digest),
+        let mut digest = digest_of(&self.path, context)?;
+        for beside in self.beside.iter().filter(|beside| beside.is_file()) {
+            digest = format!("{digest} {}", digest_of(beside, context)?);
         }
+        Ok(digest)
     }
 }

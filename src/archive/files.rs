@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::Limits;
+use btfkit_formats::picture;
 use btfkit_formats::zip::ZipIndex;
 
 use crate::error::{Error, Result};
@@ -13,10 +15,31 @@ use crate::store::mapped::MappedFile;
 /// Folders below the archive's own that are looked into.
 const FOLDER_DEPTH: usize = 8;
 
+/// Names of what systems and programs leave beside pictures; so is whatever begins with a point.
+const LEFT_BEHIND: [&str; 7] = [
+    "__MACOSX",
+    "Thumbs.db",
+    "ehthumbs.db",
+    "desktop.ini",
+    "@eaDir",
+    "$RECYCLE.BIN",
+    "System Volume Information",
+];
+
+/// Bytes that tell what a file is.
+const HEAD_BYTES: u64 = 512;
+
+/// Files that are looked at for what they are, where no picture is found.
+const SNIFFED: usize = 64;
+
 /// Files by name.
 pub(super) struct Files {
     zips: Vec<Zip>,
     entries: Vec<Entry>,
+    /// The light list that was named, and the folder or zip of its pictures left for it to be found in.
+    list: Option<usize>,
+    /// Hidden files and folders that were not looked at.
+    hidden: usize,
 }
 
 struct Zip {
@@ -36,27 +59,96 @@ enum Place {
 }
 
 impl Files {
-    /// Lists folders, zips and plain files, in the order given. Zips in a folder are looked into.
+    /// Lists folders, zips and plain files, in the order given. Zips in a folder are looked into, what is hidden is not. A light
+    /// list stands for the pictures beside it or, if there are none, in the folder above (a project has its lists in a folder
+    /// of their own).
     ///
     /// # Errors
-    /// Says where a zip is damaged.
+    /// Says where a zip is damaged, and what is no file. A file that stands alone and is of a known format that is not read is
+    /// called by its name.
     pub(super) fn list(paths: &[PathBuf], limits: &Limits) -> Result<Self> {
-        let mut files = Self { zips: Vec::new(), entries: Vec::new() };
+        let mut files = Self { zips: Vec::new(), entries: Vec::new(), list: None, hidden: 0 };
         for path in paths {
-            // A light list stands for the pictures beside it.
-            let list = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("lp")) && path.is_file();
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let path = if list { folder.unwrap_or(Path::new(".")) } else { path };
             let data = fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
             if data.is_dir() {
-                for file in list_folder(path)? {
-                    files.add(file, limits)?;
-                }
+                files.add_folder(path, limits)?;
+            } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("lp")) {
+                regular(path)?;
+                files.add_beside(path, limits)?;
             } else {
                 files.add(path.to_owned(), limits)?;
+                files.expect_known(path)?;
             }
         }
         Ok(files)
+    }
+
+    /// Adds the files of a folder.
+    fn add_folder(&mut self, folder: &Path, limits: &Limits) -> Result<()> {
+        let (files, hidden) = list_folder(folder)?;
+        self.hidden += hidden;
+        files.into_iter().try_for_each(|file| self.add(file, limits))
+    }
+
+    /// Adds the files that a light list is about, and notes that it is the one that was named.
+    fn add_beside(&mut self, list: &Path, limits: &Limits) -> Result<()> {
+        let (before, hidden) = (self.entries.len(), self.hidden);
+        let folder = list.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        self.add_folder(folder, limits)?;
+        if !self.entries.iter().skip(before).any(|entry| super::catalogue::is_picture(&entry.name)) {
+            self.entries.truncate(before);
+            self.hidden = hidden;
+            self.add_folder(&folder.join(".."), limits)?;
+        }
+        let named = fs::canonicalize(list).map_err(|error| Error::io("read", list, error))?;
+        let is_named = |entry: &Entry| match &entry.place {
+            Place::Plain(path) => {
+                path.file_name() == list.file_name() && fs::canonicalize(path).is_ok_and(|path| path == named)
+            }
+            Place::Zipped { .. } => false,
+        };
+        self.list = self.entries.iter().position(is_named);
+        if self.list.is_none() {
+            // In a hidden folder, or too deep below the one above.
+            self.list = Some(self.entries.len());
+            let name = list.to_string_lossy().into_owned();
+            self.entries.push(Entry { name, place: Place::Plain(list.to_owned()) });
+        }
+        Ok(())
+    }
+
+    /// Refuses a single file of a known format that is not read.
+    fn expect_known(&self, path: &Path) -> Result<()> {
+        let foreign = |entry: &Entry| matches!(&entry.place, Place::Plain(plain) if plain == path);
+        let alone = self.entries.last().is_some_and(foreign);
+        match picture::foreign(&path.to_string_lossy(), &read_head(path, HEAD_BYTES)?).filter(|_| alone) {
+            Some((what, way_out)) => {
+                Err(Error::input(format!("{}: this is {what}, which is not read", path.display()))
+                    .hint(way_out))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// What the first files are that are of a known format that is not read, and what to do about it.
+    pub(super) fn foreign(&self) -> Option<String> {
+        let told = |entry: &Entry| {
+            let Place::Plain(path) = &entry.place else { return None };
+            let head = read_head(path, HEAD_BYTES).ok()?;
+            let (what, way_out) = picture::foreign(&entry.name, &head)?;
+            Some(format!("{} is {what}, which is not read: {way_out}", entry.name))
+        };
+        self.entries.iter().take(SNIFFED).find_map(told)
+    }
+
+    /// The light list that was named.
+    pub(super) fn named_list(&self) -> Option<usize> {
+        self.list
+    }
+
+    /// How many hidden files and folders were not looked at.
+    pub(super) fn hidden(&self) -> usize {
+        self.hidden
     }
 
     fn add(&mut self, path: PathBuf, limits: &Limits) -> Result<()> {
@@ -72,6 +164,10 @@ impl Files {
         file.release(0..file.as_ref().len());
         let zip = self.zips.len();
         for (entry, listed) in index.entries().iter().enumerate() {
+            if listed.name().split(['/', '\\']).any(is_hidden) {
+                self.hidden += 1;
+                continue;
+            }
             let place = Place::Zipped { zip, entry };
             self.entries.push(Entry { name: listed.name().to_owned(), place });
         }
@@ -98,7 +194,9 @@ impl Files {
     pub(super) fn bytes(&self, number: usize) -> Result<Cow<'_, [u8]>> {
         match &self.entries[number].place {
             Place::Plain(path) => {
-                fs::read(path).map(Cow::Owned).map_err(|error| Error::io("read", path, error))
+                let mut bytes = Vec::new();
+                let read = regular(path)?.read_to_end(&mut bytes);
+                read.map(|_| Cow::Owned(bytes)).map_err(|error| Error::io("read", path, error))
             }
             &Place::Zipped { zip, entry } => {
                 let Zip { path, file, index } = &self.zips[zip];
@@ -126,6 +224,26 @@ impl Files {
     }
 }
 
+/// Whether a name is of something that is left beside pictures and is none of them.
+fn is_hidden(name: &str) -> bool {
+    let left = LEFT_BEHIND.iter().any(|left| left.eq_ignore_ascii_case(name));
+    left || (name.starts_with('.') && name != "." && name != "..")
+}
+
+/// Opens a file that is one. A pipe would be waited for, and a device has no end.
+///
+/// # Errors
+/// Says that it is none.
+pub(super) fn regular(path: &Path) -> Result<fs::File> {
+    let data = fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
+    if !data.is_file() {
+        let what = if data.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
+        return Err(Error::input(format!("{}: got {what}, expected a file", path.display()))
+            .hint("copy its contents into a file"));
+    }
+    fs::File::open(path).map_err(|error| Error::io("read", path, error))
+}
+
 /// Whether a file is a zip by its first bytes (an empty zip begins with its end record).
 fn is_zip(path: &Path) -> Result<bool> {
     let head = read_head(path, 4)?;
@@ -134,15 +252,15 @@ fn is_zip(path: &Path) -> Result<bool> {
 
 /// The first bytes of a file, fewer where it is shorter.
 pub(super) fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
-    use std::io::Read;
     let mut head = Vec::new();
-    let file = fs::File::open(path).map_err(|error| Error::io("read", path, error))?;
-    file.take(most).read_to_end(&mut head).map_err(|error| Error::io("read", path, error))?;
+    regular(path)?.take(most).read_to_end(&mut head).map_err(|error| Error::io("read", path, error))?;
     Ok(head)
 }
 
-/// Files below a folder, sorted by path. Links to files are followed, links to folders are not.
-fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
+/// Files below a folder, sorted by path, and how many hidden ones were left out. Links to files are followed, links to folders are
+/// not.
+fn list_folder(root: &Path) -> Result<(Vec<PathBuf>, usize)> {
+    let mut hidden = 0;
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];
     while let Some((folder, depth)) = folders.pop() {
@@ -150,6 +268,10 @@ fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
         for entry in entries {
             let entry = entry.map_err(|error| Error::io("list", &folder, error))?;
             let path = entry.path();
+            if is_hidden(&entry.file_name().to_string_lossy()) {
+                hidden += 1;
+                continue;
+            }
             let linked = entry.file_type().is_ok_and(|kind| kind.is_symlink());
             // A link that leads nowhere is no image; the hole that it leaves is reported as such.
             let Ok(data) = fs::metadata(&path) else { continue };
@@ -161,5 +283,5 @@ fn list_folder(root: &Path) -> Result<Vec<PathBuf>> {
         }
     }
     files.sort();
-    Ok(files)
+    Ok((files, hidden))
 }

@@ -9,6 +9,7 @@ mod container;
 mod files;
 #[cfg(feature = "hdf5")]
 mod hdf5;
+mod matching;
 mod pictures;
 pub mod views;
 
@@ -29,6 +30,9 @@ use adapt::Adaptation;
 
 /// Bytes that tell one container from another.
 const HEAD_BYTES: u64 = 4096;
+
+/// Longest list or table that is read.
+const MAX_LIST_BYTES: u64 = 64 << 20;
 
 /// Bytes of a file that are digested at a time.
 const DIGEST_STEP_BYTES: usize = 4 << 20;
@@ -150,15 +154,27 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
     adapt::adapt(source, reading)
 }
 
-/// The bytes of a small file beside an archive.
+/// The bytes of a small file beside an archive: a list, a table.
 fn read_beside(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| Error::io("read", path, error))
+    let mut bytes = Vec::new();
+    let mut file = files::regular(path)?.take(MAX_LIST_BYTES + 1);
+    file.read_to_end(&mut bytes).map_err(|error| Error::io("read", path, error))?;
+    list_of_bounded_size(&path.display().to_string(), &bytes)?;
+    Ok(bytes)
+}
+
+/// Refuses a list that is too large to be one.
+fn list_of_bounded_size(name: &str, bytes: &[u8]) -> Result<()> {
+    if bytes.len() as u64 <= MAX_LIST_BYTES {
+        return Ok(());
+    }
+    Err(Error::input(format!("{name}: got more than {MAX_LIST_BYTES} bytes, expected a list of pictures")))
 }
 
 /// SHA-256 of a file's bytes.
 fn digest_of(path: &Path, context: &Context<'_>) -> Result<String> {
     let failed = |error| Error::io("read", path, error);
-    let mut file = std::fs::File::open(path).map_err(failed)?;
+    let mut file = files::regular(path)?;
     let mut digest = Sha256::new();
     let mut piece = vec![0; DIGEST_STEP_BYTES];
     loop {

@@ -74,7 +74,7 @@ impl Pictures {
             remarks: Vec::new(),
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
-        let (orientation, ignored) = (header.orientation, catalogue.ignored());
+        let (orientation, ignored) = (header.orientation, catalogue.ignored() + files.hidden());
         Ok(Self { path, files, images, ignored, contents, orientation, decoding, limits })
     }
 

@@ -2,21 +2,19 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
 use btfkit::run::Context;
-use btfkit::stage::{cluster, estimate, import};
-use btfkit::store::Store;
+use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Samples};
+use btfkit::stage::{estimate, import};
 use btfkit::store::codec::Chain;
-use btfkit::store::enlarged::{self, Enlarged};
-use btfkit::store::measurement::{self, Description, Measurement};
-use btfkit::store::model::{self, Model, Stage};
+use btfkit::store::model::Stage;
 use btfkit::words::counted;
-use btfkit_formats::Direction;
 use clap::Args;
+use serde::Serialize;
 use serde_json::Value;
 
 use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, bytes_text};
+use super::{Tell, as_json, bytes_text};
 
 /// Tell what an archive or a store holds, how far it is, and how large the store of an archive will be
 #[derive(Args)]
@@ -29,6 +27,7 @@ Examples:
   btf info UBO_WOOD256.zip
   btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
   btf info wood.zarr
+  btf info wood.model.zarr --json
   btf info archives/*                               a line each, and a count")]
 pub(super) struct Info {
     /// Archives and stores; of several each has a line
@@ -39,88 +38,89 @@ pub(super) struct Info {
     pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
+    /// Tell it as JSON
+    #[arg(long)]
+    json: bool,
 }
 
-/// Rows that tell what a measurement, or an archive as a measurement, holds.
-fn described(description: &Description) -> Vec<Vec<String>> {
-    let directions = |list: &[Direction]| {
-        let thetas: Vec<f64> = list.iter().map(|d| d.degrees().0).collect();
-        let (low, high) = thetas.iter().fold((f64::MAX, f64::MIN), |(l, h), &t| (l.min(t), h.max(t)));
-        format!("{}, theta {low:.1} to {high:.1} degrees", list.len())
-    };
-    let channels = match description.channels.as_slice() {
-        [first, .., last] if description.n_channels() > 4 => {
-            format!("{} channels, {first} to {last}", description.n_channels())
-        }
-        names => names.join(" "),
-    };
-    vec![
-        row!["views", directions(&description.views)],
-        row!["lights", directions(&description.lights)],
-        row!["size", format!("{}, {channels}, {}", description.size, description.sample_type.name())],
-        row!["transfer", format!("{:?}", description.transfer).to_lowercase()],
-        row!["raw", bytes_text(description.bytes())],
-    ]
+/// What an archive holds, and how large its store will be.
+#[derive(Serialize)]
+struct Archive {
+    kind: &'static str,
+    format: String,
+    #[serde(flatten)]
+    samples: Samples,
+    /// Bytes of the store by each chain of codecs, about.
+    store_bytes: Vec<(&'static str, u64)>,
+    remarks: Vec<(String, String)>,
+    notes: Vec<String>,
+    assumptions: Vec<String>,
 }
+
+/// What was found at one input.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Told {
+    Archive(Box<Archive>),
+    Store(About),
+}
+
+type Rows = Vec<Vec<String>>;
 
 impl Info {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
         if self.paths.len() > 1 && !self.pieces {
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, false, context, tell, |path| {
-                Ok((Line::Text(in_short(&self.rows(std::slice::from_ref(path), context)?)), None))
+            return each(&self.paths, name, self.json, context, tell, |path| {
+                let told = self.look(std::slice::from_ref(path), context)?;
+                let line =
+                    if self.json { Line::Json(as_json(&told)?) } else { Line::Text(in_short(&rows(&told))) };
+                Ok((line, None))
             });
         }
-        tell.text(&table(&self.rows(&self.paths, context)?));
+        let told = self.look(&self.paths, context)?;
+        if self.json {
+            tell.plan(&as_json(&told)?)?;
+        } else {
+            tell.text(&table(&rows(&told)));
+        }
         Ok(Ended::Done)
     }
 
-    /// What is to be told of one input, which may lie in pieces.
-    fn rows(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Vec<Vec<String>>> {
-        let path = paths.first().map_or(Path::new(""), PathBuf::as_path);
-        let store = path.join("zarr.json").exists();
-        match store
-            .then(|| Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND]))
-            .transpose()?
-        {
-            None => self.archive(paths, context),
-            Some(attributes) => match attributes.get("kind").and_then(Value::as_str) {
-                Some(measurement::KIND) => measurement(path),
-                Some(model::KIND) => model(path),
-                Some(enlarged::KIND) => enlarged(path),
-                kind => Ok(vec![row!["kind", kind.unwrap_or("unknown")]]),
-            },
+    /// Looks at one store, or at one archive in pieces perhaps.
+    fn look(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Told> {
+        let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
+        let has = |name: &str| first.join(name).exists();
+        if has("zarr.json") || has(".zgroup") || has(".zarray") {
+            return about::store(first).map(Told::Store);
         }
-    }
-
-    fn archive(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Vec<Vec<String>>> {
         let source = self.source.open(paths)?;
         let contents = source.contents();
-        let description = import::describe(source.as_ref(), 1.0);
-        let mut rows = vec![row!["kind", format!("archive, {}", contents.format)]];
-        rows.extend(described(&description));
-        for codec in [Chain::Stock, Chain::Predictive] {
-            let bytes = estimate::store_bytes(source.as_ref(), codec, context)?;
-            rows.push(row![format!("store, about ({})", codec.name()), bytes_text(bytes)]);
-        }
-        rows.extend(contents.remarks.iter().map(|(name, value)| row![name, value]));
-        rows.extend(source.notes().iter().map(|note| row!["note", note]));
-        rows.extend(contents.assumptions.iter().map(|assumption| row!["assumed", assumption]));
-        Ok(rows)
+        let bytes =
+            |codec: Chain| Ok((codec.name(), estimate::store_bytes(source.as_ref(), codec, context)?));
+        Ok(Told::Archive(Box::new(Archive {
+            kind: "archive",
+            format: contents.format.to_string(),
+            samples: Samples::of(&import::describe(source.as_ref(), 1.0)),
+            store_bytes: [Chain::Stock, Chain::Predictive].into_iter().map(bytes).collect::<Result<_>>()?,
+            remarks: contents.remarks.clone(),
+            notes: source.notes(),
+            assumptions: contents.assumptions.clone(),
+        })))
     }
 }
 
 /// What tells an input apart from others, of what is told of it.
 fn in_short(rows: &[Vec<String>]) -> String {
-    const TOLD: [&str; 6] = ["views", "lights", "size", "views done", "method", "shards done"];
+    const TOLD: [&str; 7] = ["views", "lights", "clusters", "views done", "method", "seed", "shards done"];
     let told = rows.iter().filter_map(|row| match row.as_slice() {
-        [name, value] if name == "kind" => Some(value.clone()),
-        [name, value] if name == "size" => Some(value.clone()),
-        [name, value] if TOLD.contains(&name.as_str()) => {
-            let value = value.split_once(',').map_or(value.as_str(), |(first, _)| first);
+        [name, value] if name == "kind" || name == "size" => Some(value.clone()),
+        // How far a model's stages are.
+        [name, value] if Stage::ALL.iter().any(|stage| stage.name() == name) => {
             Some(format!("{name} {value}"))
         }
-        [name, value] if Stage::ALL.iter().any(|stage| stage.name() == name) => {
+        [name, value] if TOLD.contains(&name.as_str()) => {
+            let value = value.split_once(',').map_or(value.as_str(), |(first, _)| first);
             Some(format!("{name} {value}"))
         }
         _ => None,
@@ -128,50 +128,178 @@ fn in_short(rows: &[Vec<String>]) -> String {
     told.collect::<Vec<_>>().join(", ")
 }
 
-fn measurement(path: &Path) -> Result<Vec<Vec<String>>> {
-    let measurement = Measurement::open(path)?;
-    let description = measurement.description();
-    let mut rows = vec![row!["kind", measurement::KIND]];
-    rows.extend(described(description));
-    rows.push(row!["white", description.white]);
-    rows.push(row!["views done", format!("{} of {}", measurement.views_done(), description.views.len())]);
-    let attributes = measurement.attributes()?;
-    let assumptions = attributes.get("assumptions").and_then(Value::as_array);
-    let texts = assumptions.into_iter().flatten().filter_map(Value::as_str);
-    rows.extend(texts.map(|assumption| row!["assumed", assumption]));
-    Ok(rows)
+fn rows(told: &Told) -> Rows {
+    match told {
+        Told::Archive(archive) => of_archive(archive),
+        Told::Store(About::Measurement(about)) => of_measurement(about),
+        Told::Store(About::Model(about)) => of_model(about),
+        Told::Store(About::Enlarged(about)) => of_enlarged(about),
+    }
 }
 
-fn model(path: &Path) -> Result<Vec<Vec<String>>> {
-    let model = Model::open(path)?;
-    let mut rows = vec![row!["kind", model::KIND]];
-    for stage in Stage::ALL {
-        let done = if model.stage(stage)?.is_some() { "done" } else { "not run" };
-        rows.push(row![stage.name(), done]);
+fn of_archive(archive: &Archive) -> Rows {
+    let mut rows = vec![row!["kind", format!("archive, {}", archive.format)]];
+    rows.extend(of_samples(&archive.samples));
+    for (codec, bytes) in &archive.store_bytes {
+        rows.push(row![format!("store, about ({codec})"), bytes_text(*bytes)]);
     }
-    if model.stage(Stage::Cluster)?.is_some() {
-        let report: cluster::Report = model.report(Stage::Cluster)?;
-        for (number, pass) in report.passes.iter().enumerate() {
-            let found = format!(
-                "mean weighted |dL*| {:.4}, {} moved",
-                pass.mean_lightness_error,
-                counted(pass.moved, "texel")
-            );
-            rows.push(row![format!("  pass {}", number + 1), found]);
+    rows.extend(archive.remarks.iter().map(|(name, value)| row![name, value]));
+    rows.extend(archive.notes.iter().map(|note| row!["note", note]));
+    rows.extend(archive.assumptions.iter().map(|assumption| row!["assumed", assumption]));
+    rows
+}
+
+/// Rows that tell what a measurement, or an archive as a measurement, holds.
+fn of_samples(samples: &Samples) -> Rows {
+    let directions = |list: &about::Directions| {
+        let [low, high] = list.theta_deg;
+        format!("{}, theta {low:.1} to {high:.1} degrees", list.count)
+    };
+    let channels = match samples.channels.as_slice() {
+        [first, .., last] if samples.channels.len() > 4 => {
+            format!("{} channels, {first} to {last}", samples.channels.len())
         }
-    }
-    Ok(rows)
+        names => names.join(" "),
+    };
+    let Samples { width, height, samples: of_type, .. } = samples;
+    vec![
+        row!["views", directions(&samples.views)],
+        row!["lights", directions(&samples.lights)],
+        row!["size", format!("{width}x{height}, {channels}, {of_type}")],
+        row!["transfer", samples.transfer],
+        row!["raw", bytes_text(samples.raw_bytes)],
+    ]
 }
 
-fn enlarged(path: &Path) -> Result<Vec<Vec<String>>> {
-    let enlarged = Enlarged::open(path)?;
-    let shards = enlarged.shards();
-    let done = enlarged.shards_done();
-    Ok(vec![
-        row!["kind", enlarged::KIND],
-        row!["size", enlarged.size()],
-        row!["method", format!("{:?}", enlarged.method()).to_lowercase()],
-        row!["source", if enlarged.has_source() { "kept" } else { "not kept" }],
-        row!["shards done", format!("{done} of {}", shards.texels())],
-    ])
+/// Rows that all stores have.
+fn of_kept(kept: &Kept) -> Rows {
+    vec![
+        row!["on disk", bytes_text(kept.stored_bytes)],
+        row!["made by", format!("btf {}, layout {}", kept.version, kept.layout)],
+    ]
+}
+
+fn of_measurement(about: &Measured) -> Rows {
+    let mut rows = vec![row!["kind", "measurement"]];
+    rows.extend(of_samples(&about.samples));
+    rows.push(row!["white", about.white]);
+    rows.push(row!["views done", format!("{} of {}", about.views_done, about.samples.views.count)]);
+    rows.push(row!["codec", about.codec]);
+    rows.extend(about.archive.iter().map(|format| row!["archive", format]));
+    rows.push(row!["digest", about.digest]);
+    rows.extend(of_kept(&about.kept));
+    rows.extend(about.assumptions.iter().map(|assumption| row!["assumed", assumption]));
+    rows
+}
+
+/// The word for what is or is not so.
+fn yes(is_so: bool) -> &'static str {
+    if is_so { "yes" } else { "no" }
+}
+
+/// Pairs such as of a lattice, `dy,dx;dy,dx`.
+fn pairs<T: std::fmt::Display>(list: &[[T; 2]]) -> String {
+    let pairs: Vec<String> = list.iter().map(|[a, b]| format!("{a},{b}")).collect();
+    if pairs.is_empty() { "none".to_owned() } else { pairs.join(";") }
+}
+
+fn of_model(about: &Modelled) -> Rows {
+    let mut rows = vec![row!["kind", "model"]];
+    let asked = |stage: &str, name: &str| {
+        let recipe =
+            about.stages.iter().find(|done| done.stage == stage).and_then(|done| done.recipe.as_ref());
+        recipe.and_then(|recipe| recipe.get(name)).filter(|value| !value.is_null()).map(|value| match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        })
+    };
+    for done in &about.stages {
+        let word = match (done.done, done.recipe.is_some()) {
+            (true, _) => "done",
+            (false, true) => "arrays are missing",
+            (false, false) => "not run",
+        };
+        rows.push(row![done.stage, word]);
+        match done.stage {
+            "tile" => {
+                let Some(tile) = &about.tile else { continue };
+                let [rows_measured, columns] = tile.measurement_size;
+                rows.push(row!["  size", tile.size()]);
+                rows.push(row!["  of", format!("a measurement of {columns}x{rows_measured}")]);
+                rows.extend(about.measurement.iter().map(|digest| row!["  measurement's digest", digest]));
+                rows.push(row!["  borders join", yes(tile.wraps)]);
+                rows.extend(asked("tile", "tile").map(|tile| row!["  asked for", tile]));
+                rows.push(row!["  lattice", pairs(&tile.lattice.vectors())]);
+                rows.push(row!["  seam visibility", format!("{:.2}", tile.seam_visibility)]);
+            }
+            "cluster" => {
+                let Some(report) = &about.cluster else { continue };
+                rows.push(row!["  clusters", report.clusters]);
+                rows.extend(report.taken_from.iter().map(|(name, _)| row!["  taken from", name]));
+                for (number, pass) in report.passes.iter().enumerate() {
+                    let found = format!(
+                        "mean weighted |dL*| {:.4}, {} moved",
+                        pass.mean_lightness_error,
+                        counted(pass.moved, "texel")
+                    );
+                    rows.push(row![format!("  pass {}", number + 1), found]);
+                }
+                for name in ["amount", "centre", "sample", "restarts"] {
+                    rows.extend(asked("cluster", name).map(|value| row![format!("  {name}"), value]));
+                }
+                rows.push(row!["  representatives", bytes_text(report.representative_bytes)]);
+                rows.push(row!["  index", bytes_text(report.index_bytes)]);
+            }
+            "normals" => {
+                let Some(report) = &about.normals else { continue };
+                rows.push(row!["  view, lights", format!("{}, {}", report.view, report.lights)]);
+                rows.push(row!["  spread", format!("{:.2} degrees", report.spread_deg)]);
+            }
+            "fit" => {
+                let Some(report) = &about.field else { continue };
+                rows.push(row![
+                    "  field",
+                    format!("{}, {}", report.mrf, counted(report.levels.len(), "level"))
+                ]);
+                for name in ["field", "gains", "marginals"] {
+                    rows.extend(asked("fit", name).map(|value| row![format!("  {name} of"), value]));
+                }
+                let etas: Vec<String> = report.levels.iter().map(|level| level.eta.to_string()).collect();
+                rows.push(row!["  neighbours", etas.join(", ")]);
+                rows.push(row!["  autocovariance error", format!("{:.4}", report.autocovariance_error)]);
+            }
+            _ => {
+                let Some(report) = &about.appearance else { continue };
+                let [y, x, height, width] = report.exemplar;
+                rows.push(row!["  exemplar", format!("{width}x{height} from {x},{y}")]);
+                rows.push(row!["  levels", report.levels.len()]);
+                rows.push(row!["  lattice", report.found]);
+            }
+        }
+        rows.extend(asked(done.stage, "seed").map(|seed| row!["  seed", seed]));
+    }
+    rows.extend(of_kept(&about.kept));
+    rows
+}
+
+fn of_enlarged(about: &Grown) -> Rows {
+    let unknown = || "not known".to_owned();
+    let mut rows = vec![
+        row!["kind", "enlarged"],
+        row!["size", format!("{}x{}", about.width, about.height)],
+        row!["method", format!("{:?}", about.method).to_lowercase()],
+        row!["seed", about.seed],
+        row!["tileable", yes(about.tileable)],
+    ];
+    rows.extend(about.options.iter().map(|(name, value)| row![name, value]));
+    rows.extend([
+        row!["source", if about.source { "kept" } else { "not kept" }],
+        row!["normals", if about.normals { "kept" } else { "not kept" }],
+        row!["model", about.model.as_deref().unwrap_or("not known")],
+        row!["tile", about.tile.map_or_else(unknown, |[width, height]| format!("{width}x{height}"))],
+        row!["clusters", about.clusters.map_or_else(unknown, |clusters| clusters.to_string())],
+        row!["shards done", format!("{} of {}", about.shards_done, about.shards)],
+    ]);
+    rows.extend(of_kept(&about.kept));
+    rows
 }

@@ -30,7 +30,8 @@ mod verify;
 use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
@@ -165,6 +166,7 @@ pub(crate) fn run() -> ExitCode {
         .map(|context| {
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
+        .inspect(|context| obey_while_computing(&stop, context.computing()))
         .and_then(|context| cli.command.run(&context, tell));
     progress.end();
     match result {
@@ -175,6 +177,26 @@ pub(crate) fn run() -> ExitCode {
             ExitCode::from(exit_code(error.kind()))
         }
     }
+}
+
+/// Time between two looks at whether a stop was asked for.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Ends the program at the first signal while it computes what cannot look for one: there is nothing to lose but time.
+fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>) {
+    let stop = Arc::clone(stop);
+    // Without a thread for it the second signal ends the program.
+    let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        loop {
+            std::thread::sleep(LOOK);
+            if stop.load(Ordering::SeqCst) && computing.load(Ordering::SeqCst) {
+                let error = Error::stopped();
+                let _ =
+                    writeln!(std::io::stderr(), "btf: {error}\n  {}", error.guidance().unwrap_or_default());
+                std::process::exit(i32::from(exit_code(error.kind())));
+            }
+        }
+    });
 }
 
 impl Command {

@@ -63,7 +63,11 @@ impl Writer {
         let temporary = mapped::temporary_name(path);
         // The newer layout of metadata has checksums throughout; the older one has none, and the C library believes it.
         let builder = File::with_options().with_fapl(|access| access.libver_v110()).clone();
-        let file = builder.create_excl(&temporary).map_err(|error| cannot_write(path, &error))?;
+        let file = builder.create_excl(&temporary).map_err(|error| {
+            // It may have got as far as the file.
+            let _ = fs::remove_file(&temporary);
+            cannot_write(path, &error)
+        })?;
         let mut writer = Self {
             path: path.to_owned(),
             existing: Existing::Keep,

@@ -7,6 +7,7 @@ pub mod read_ahead;
 pub mod recipe;
 pub mod units;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
@@ -25,6 +26,7 @@ pub struct Context<'a> {
     pub memory_bytes: u64,
     /// What to do about what lies where a result is to be.
     pub existing: Existing,
+    computing: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
 
@@ -41,7 +43,15 @@ impl<'a> Context<'a> {
             .num_threads(threads)
             .build()
             .map_err(|error| budget::cannot_start(threads, &error))?;
-        Ok(Self { progress, stop, threads, memory_bytes, existing: Existing::Keep, pool })
+        Ok(Self {
+            progress,
+            stop,
+            threads,
+            memory_bytes,
+            existing: Existing::Keep,
+            computing: Arc::default(),
+            pool,
+        })
     }
 
     /// The same, with results that take the place of what is there.
@@ -66,6 +76,20 @@ impl<'a> Context<'a> {
     /// Memory for the work itself.
     pub fn work_bytes(&self) -> u64 {
         self.memory_bytes.saturating_sub(budget::OWN_BYTES)
+    }
+
+    /// Runs `work` on the pool that may take long, writes nothing and does not look for a stop: while it runs,
+    /// [`Self::computing`] is set, and whoever started the program may end it.
+    pub fn compute<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.computing.store(true, Ordering::SeqCst);
+        let result = self.install(work);
+        self.computing.store(false, Ordering::SeqCst);
+        result
+    }
+
+    /// Set while there is nothing to lose but time.
+    pub fn computing(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.computing)
     }
 
     /// Runs `work` on the pool.

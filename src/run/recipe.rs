@@ -59,7 +59,7 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
     if let (Value::Object(old), Value::Object(new)) = (old, new) {
         let mut keys: Vec<&String> = old.keys().chain(new.keys()).collect();
         // What decides about the meaning of the other settings comes first.
-        keys.sort_by_key(|key| (!["stage", "rule", "tile"].contains(&key.as_str()), key.as_str()));
+        keys.sort_by_key(|key| (!["stage", "rule", "tile", "reading"].contains(&key.as_str()), key.as_str()));
         let entry = |map: &Map<String, Value>, key: &str| map.get(key).cloned().unwrap_or(Value::Null);
         return keys
             .iter()

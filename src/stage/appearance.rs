@@ -73,11 +73,11 @@ impl Plan {
         let index = self.model.index()?;
         let size = self.tile.size;
         let all = self.features(&index, context)?;
-        let (found, strongest_peak) = context.install(|| self.lattice(&index, &all));
+        let (found, strongest_peak) = context.compute(|| self.lattice(&index, &all));
         let (exemplar, counts) = exemplar(&found, size, self.tile.wraps);
         let texels = part(&index, size.width, exemplar);
         let features = if exemplar.size == size { all } else { self.features(&texels, context)? };
-        let appearance = context.install(|| fit(exemplar, self.tile.wraps, &texels, features, counts));
+        let appearance = context.compute(|| fit(exemplar, self.tile.wraps, &texels, features, counts));
         self.model.write_appearance(&appearance)?;
         let report = AppearanceReport::new(&appearance, &found, strongest_peak);
         self.model.finish(Stage::Appearance, &self.recipe, &report, context)?;
@@ -129,7 +129,7 @@ impl Plan {
             opponents: &opponents,
             counts: &counts,
         };
-        Ok(context.install(|| features(&clusters)))
+        Ok(context.compute(|| features(&clusters)))
     }
 }
 

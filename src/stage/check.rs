@@ -51,7 +51,7 @@ impl Report {
 /// What the source fails with, or [`crate::Kind::Stopped`].
 pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Report)> {
     let statistics = statistics::gather(source, context)?;
-    let report = context.install(|| examine(&statistics));
+    let report = context.compute(|| examine(&statistics));
     Ok((statistics, report))
 }
 

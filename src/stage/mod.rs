@@ -1,5 +1,6 @@
 //! The steps of the work, one module a command: options, then a plan, then a run.
 
+pub mod about;
 pub mod appearance;
 pub mod check;
 pub mod cluster;

@@ -15,11 +15,13 @@ use zarrs::array::{
     FillValue, data_type,
 };
 
+use zarrs_storage::StorageError;
+
 use super::codec::{self, Codecs};
 use super::mapped::{self, MappedStorage};
 use super::metadata::{self, may_be_ignored, read_object, shown};
 use super::{Store, ZSTD_LEVEL};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Kind, Result, advice};
 
 /// Most bytes of a chunk that is not in a shard.
 const CHUNK_LIMIT_BYTES: u64 = 16 << 20;
@@ -340,10 +342,19 @@ fn difference(found: &Map<String, Value>, expected: &Value, strict: bool) -> std
     }
 }
 
+/// An error of writing through zarrs; the storage has put the path and the system's own words into it.
 fn write_error(error: &zarrs::array::ArrayError) -> Error {
-    let mut failed = Error::new(Kind::Io, error.to_string());
-    if error.to_string().contains("No space left") {
-        failed = failed.hint("free some space and run the same command again");
+    use zarrs::array::{ArrayError, CodecError};
+    let refused = match error {
+        ArrayError::StorageError(StorageError::IOError(refused))
+        | ArrayError::CodecError(
+            CodecError::IOError(refused) | CodecError::StorageError(StorageError::IOError(refused)),
+        ) => Some(refused),
+        _ => None,
+    };
+    let failed = Error::new(Kind::Io, error.to_string());
+    match refused.and_then(|refused| advice(refused, false)) {
+        Some(advice) => failed.hint(advice),
+        None => failed,
     }
-    failed
 }

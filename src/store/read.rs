@@ -22,7 +22,7 @@ const LIMIT_BYTES: u64 = 1 << 34;
 const BATCH: usize = 64;
 
 /// What to do about a damaged chunk.
-pub(crate) const DAMAGED: &str = "the store is damaged: delete this file and run the command that made it again, which writes what is missing";
+pub(crate) const DAMAGED: &str = "the store is damaged: if what it was made of is still there, delete this file and run the command that made it again, which writes what is missing";
 
 /// A chunk of a box: where it lies in the array, and its bytes.
 struct Piece {

@@ -186,7 +186,7 @@ fn nonsense_metadata_is_refused() {
     let out = folder.path().join("out.png");
     for (file, from, to) in [
         ("reflectance/zarr.json", "48", "48000000000"),
-        ("zarr.json", "\"format\": 1", "\"format\": 9"),
+        ("zarr.json", "\"format\": 2", "\"format\": 9"),
         ("zarr.json", "srgb", "sRGB?"),
         ("view_direction/zarr.json", "float64", "float32"),
     ] {

@@ -63,7 +63,10 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("transpose", Changes(&["--transpose"])),
             ("swap", Changes(&["--swap"])),
             ("cosine", Changes(&["--cosine", "excluded"])),
-            ("pattern", Keeps(&["--pattern", "tl{theta_i} pl{phi_i} tv{theta_v} pv{phi_v}.jpg"])),
+            (
+                "pattern",
+                Apart("the directions and the digest of the images in their order are in the recipe"),
+            ),
             ("table", Apart("the directions and the digest of the images in their order are in the recipe")),
             ("order", Changes(&["--order", "ubo81"])),
             ("rows", Changes(&["--rows", "reversed"])),

@@ -13,7 +13,7 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let Some((&count, array)) = bytes.split_first() else { return };
     let list = (0..count).map(|i| Direction { theta_rad: 0.005 * f64::from(i), phi_rad: 1.0 }).collect();
-    let beside = Beside { views: None, lights: Some(list) };
+    let beside = Beside { views: None, lights: Some(list), channels: None };
     let Ok(archive) = Archive::open(array, beside, &limits) else { return };
     let lights = archive.contents().lights.len();
     assert_eq!(lights, usize::from(count));

@@ -2,6 +2,7 @@
 
 use roxmltree::{Document, ParsingOptions};
 
+use crate::text::utf8;
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Attributes of one element; published ones have ten at most. The parser compares each with all others of its element.
@@ -9,17 +10,7 @@ const MAX_ATTRIBUTES: usize = 256;
 
 /// Parses a text: no document type, no namespaces, no element of very many attributes, as many nodes as a zip may have
 /// entries. Nested elements cost the parser no stack.
-pub(super) fn parse<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Document<'a>> {
-    if u64::try_from(bytes.len()).is_ok_and(|length| length > limits.max_entry_bytes) {
-        let expected = format!("at most {} (max_entry_bytes)", limits.max_entry_bytes);
-        return Err(Error::new(ErrorKind::Limit, format!("{} bytes of XML", bytes.len()), expected));
-    }
-    // Writers are not agreed on whether the text ends in a zero.
-    let end = bytes.iter().rposition(|&byte| byte != 0).and_then(|last| last.checked_add(1)).unwrap_or(0);
-    let bytes = bytes.get(..end).unwrap_or(bytes);
-    let Ok(text) = std::str::from_utf8(bytes) else {
-        return Err(Error::malformed("XML that is not UTF-8", "UTF-8"));
-    };
+pub(super) fn parse<'a>(text: &'a str, limits: &Limits) -> Result<Document<'a>> {
     if text.contains("xmlns") {
         return Err(Error::new(ErrorKind::Unsupported, "XML with namespaces", "none"));
     }
@@ -39,6 +30,19 @@ pub(super) fn parse<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Document<'a>
         }
         other => Error::malformed(format!("XML that breaks its rules: {other}"), "well-formed XML"),
     })
+}
+
+/// The text of a chunk, of limited size: UTF-8, or UTF-16 with its mark.
+pub(super) fn text(bytes: &[u8], limits: &Limits) -> Result<String> {
+    if u64::try_from(bytes.len()).is_ok_and(|length| length > limits.max_entry_bytes) {
+        let expected = format!("at most {} (max_entry_bytes)", limits.max_entry_bytes);
+        return Err(Error::new(ErrorKind::Limit, format!("{} bytes of XML", bytes.len()), expected));
+    }
+    let Ok(text) = String::from_utf8(utf8(bytes)?.into_owned()) else {
+        return Err(Error::malformed("XML that is not UTF-8", "UTF-8"));
+    };
+    // Writers are not agreed on whether the text ends in a zero.
+    Ok(text.trim_end_matches('\0').to_owned())
 }
 
 /// No element has more: values that are begun since the last `<`, which no value may hold.

@@ -99,20 +99,33 @@ impl ZeroBytes {
         Some(position_of(table, entry.value) > 0.5)
     }
 
-    /// Every entry must be about a zero byte and name one of its two values.
+    /// Every entry must be of the table. About a zero byte it must name one of its two values; about another one, or in a
+    /// table of one value, it changes nothing and must only say what is there.
     fn check(&self, table: &FloatTable, name: &str) -> Result<()> {
+        // Half a step of the quantisation, and what a text of six decimals leaves of a value.
+        let range = f64::from(table.max) - f64::from(table.min);
+        let near = |value: f64, wanted: f32| {
+            let wanted = f64::from(wanted);
+            (value - wanted).abs() <= (range / 512.0).max(1e-5 * wanted.abs()).max(1e-6)
+        };
         for entry in self.entries.iter().filter(|entry| entry.table == name) {
-            let place =
-                entry.row.checked_mul(table.columns).and_then(|start| start.checked_add(entry.column));
-            let about = format!("{name} {} {} {}", entry.row, entry.column, entry.value);
-            if entry.column >= table.columns || !place.is_some_and(|place| table.is_zero_byte(place)) {
-                let expected = "zero bytes that are in this database";
+            let about = format!("the line {name} {} {} {}", entry.row, entry.column, entry.value);
+            if entry.column >= table.columns || entry.row >= table.rows {
+                let expected =
+                    format!("places in the table's {} rows and {} columns", table.rows, table.columns);
                 return Err(Error::new(ErrorKind::Argument, about, expected));
             }
-            // Half a step of the quantisation: the value comes from a text of six decimals.
-            let position = position_of(table, entry.value);
-            if position.abs() > 1.0 / 512.0 && (position - 1.0).abs() > 1.0 / 512.0 {
-                let expected = format!("the value {} or {}", table.min, table.max);
+            let place = entry.row.saturating_mul(table.columns).saturating_add(entry.column);
+            if table.is_zero_byte(place) {
+                if !near(entry.value, table.min) && !near(entry.value, table.max) {
+                    let expected = format!("the value {} or {}", table.min, table.max);
+                    return Err(Error::new(ErrorKind::Argument, about, expected));
+                }
+            } else if !near(entry.value, table.get(entry.row, entry.column)) {
+                let expected = format!(
+                    "the value {}, as that byte is not ambiguous",
+                    table.get(entry.row, entry.column)
+                );
                 return Err(Error::new(ErrorKind::Argument, about, expected));
             }
         }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::fields::{Field, Forms, NumberPrefix};
+use crate::fields::{Field, Forms, NumberPrefix, goes_on};
 use crate::file_name::picture_stem;
 use crate::{Error, ErrorKind, Pair, Result};
 
@@ -20,7 +20,7 @@ const MAX_BYTES: usize = 1024;
 /// | `{theta_i:rad}` ... | the same in radians (`:deg` is the default) |
 /// | `{x_i}` `{y_i}` `{z_i}`, `{x_v}` ... | a vector towards the light or the viewer, of any length |
 /// | `{n}` | digits that do not matter |
-/// | `{*}` | anything within one part of the path, or nothing |
+/// | `{*}` | anything within one part of the path, or nothing; after a number not `,5`, `p5`, `e1` and the like |
 /// | other text | itself, without regard to ASCII case |
 ///
 /// A pattern with `/` is compared with as many parts from the end of a path as it has; one without, with the
@@ -212,6 +212,9 @@ fn fits(
             lengths.into_iter().flatten().any(|length| {
                 let Some((number, rest)) = text.split_at_checked(length) else { return false };
                 let Ok(value) = number.parse::<f64>() else { return false };
+                if later.first() == Some(&Token::Anything) && goes_on(rest) {
+                    return false;
+                }
                 let before = values.len();
                 values.push((*field, if *radians { value.to_degrees() } else { value }));
                 let fit = fits(later, rest, values, failed);
@@ -278,6 +281,8 @@ mod tests {
             ("a/{theta_i}_{phi_i}", "15_30.png"),
             ("a/{theta_i}_{phi_i}", "b/15_30.png"),
             ("{x_i}_{y_i}_{z_i}", "0_0_0.png"),
+            ("l{theta_i}{*}_p{phi_i}{*}", "l7,5_p30.png"),
+            ("l{theta_i}{*}_p{phi_i}{*}", "l7_p30e1.png"),
             ("ä{theta_i}_{phi_i}", "é1_2.png"),
             ("é{theta_i}_{phi_i}", "e1_2.png"),
         ] {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Pattern;
-use crate::fields::{Component, Field, NumberPrefix, Side};
+use crate::fields::{Component, Field, NumberPrefix, Side, digits_are_left};
 use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
@@ -68,8 +68,8 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
     };
     let pattern = pattern_of(first).ok_or_else(|| {
         unsupported(
-            format!("the name {first:?}, whose numbers carry no labels of a whole direction"),
-            "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0`, or a pattern that says what is what",
+            format!("the name {first:?}, whose numbers carry no labels of a whole direction, or more digits behind them"),
+            "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0` with decimal points, or a pattern that says what is what",
         )
     })?;
     let mut seen = HashMap::new();
@@ -135,6 +135,12 @@ impl Labels {
                 // Both ways of labelling, or a label with three numbers: what is meant cannot be known.
                 _ => return None,
             };
+            // Digits that belong to no label, right behind a number of one: it may have been read by half.
+            if let Some((_, length)) = &found
+                && digits_are_left(number.get(*length..)?)
+            {
+                return None;
+            }
             let digits = || number.len().saturating_sub(after_digits(number).len());
             let (fields, length) = found.unwrap_or_else(|| ("{n}".to_owned(), digits()));
             pattern.push_str(before);
@@ -253,6 +259,16 @@ mod tests {
             ("tv15_pv30.png", ""),
             ("tl15_pl30_theta_i20.png", ""),
             ("tl95_pl30.png", ""),
+            ("tl7,5_pl0.png", ""),
+            ("tl7_5_pl0.png", ""),
+            ("tl7-5_pl0.png", ""),
+            ("tl7p5_pl0.png", ""),
+            ("tl7 5_pl0.png", ""),
+            ("tl4.5e+01_pl0.png", ""),
+            ("tl7_pl22,5.png", ""),
+            ("l15_30,5_v0_0.png", ""),
+            ("l15_30p5_v0_0.png", ""),
+            ("l15,5_30_v0_0.png", ""),
             ("{tl15_pl30}.png", ""),
         ] {
             let found = recognise([name]).map(|pattern| pattern.to_string()).unwrap_or_default();

@@ -7,6 +7,8 @@ use half::f16;
 use super::header::{Header, Scalar, elements, write};
 use crate::catalogue::repeated_direction;
 use crate::directions::published_name;
+use crate::file_name::repeated;
+use crate::text::utf8;
 use crate::{Angles, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
 /// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0
@@ -28,6 +30,35 @@ pub struct Beside {
     pub views: Option<Vec<Direction>>,
     /// Of the lights.
     pub lights: Option<Vec<Direction>>,
+    /// Names of the channels; without them one is Y, three are R, G, B, and others have no meaning.
+    pub channels: Option<Vec<String>>,
+}
+
+/// The names of channels in a text, one a line, as [`channels_file`] writes it.
+///
+/// # Errors
+/// [`ErrorKind::Malformed`]: not UTF-8 (or UTF-16 with its mark), an empty name, a name twice.
+pub fn channels(text: &[u8]) -> Result<Vec<String>> {
+    let Ok(text) = String::from_utf8(utf8(text)?.into_owned()) else {
+        return Err(Error::malformed("a list of channels that is not UTF-8", "UTF-8"));
+    };
+    let names: Vec<String> = text.trim_end().lines().map(|line| line.trim().to_owned()).collect();
+    if names.iter().any(String::is_empty) {
+        return Err(Error::malformed("a channel without a name", "one name a line"));
+    }
+    match repeated(names.iter().map(String::as_str)) {
+        Some((first, again)) => {
+            let found =
+                format!("one name in the lines {} and {}", first.saturating_add(1), again.saturating_add(1));
+            Err(Error::malformed(found, "every channel once"))
+        }
+        None => Ok(names),
+    }
+}
+
+/// The text that lies beside an array for the names of its channels.
+pub fn channels_file(names: &[String]) -> Vec<u8> {
+    names.iter().flat_map(|name| [name.as_bytes(), b"\n"].concat()).collect()
 }
 
 impl Archive {
@@ -72,7 +103,7 @@ impl Archive {
             format: format!("numpy array, {}", sample_type.name()),
             width: side(width)?,
             height: side(height)?,
-            channels: channel_names(channels),
+            channels: named(channels, beside.channels)?,
             sample_type,
             views: checked("views", views, given_views)?,
             lights: checked("lights", lights, beside.lights)?,
@@ -162,6 +193,15 @@ fn side(pixels: u64) -> Result<u32> {
         .map_err(|_| Error::new(ErrorKind::Limit, format!("{pixels} rows or columns"), "at most 2^32 - 1"))
 }
 
+fn named(count: u64, given: Option<Vec<String>>) -> Result<Vec<String>> {
+    let Some(names) = given else { return Ok(channel_names(count)) };
+    if u64::try_from(names.len()).ok() == Some(count) {
+        return Ok(names);
+    }
+    let found = format!("{} names of channels in NAME.channels.txt", names.len());
+    Err(Error::new(ErrorKind::Argument, found, format!("{count} as in the array")))
+}
+
 fn channel_names(count: u64) -> Vec<String> {
     match count {
         1 => vec!["Y".to_owned()],
@@ -182,7 +222,8 @@ fn checked(axis: &str, count: u64, given: Option<Vec<Direction>>) -> Result<Vec<
         return wrong(format!("{count} {axis} without directions"), expected);
     };
     if u64::try_from(list.len()).ok() != Some(count) {
-        return wrong(format!("{} directions of {axis}", list.len()), format!("{count} as in the array"));
+        let found = format!("{} directions of {axis} beside the array", list.len());
+        return wrong(found, format!("{count} as in the array"));
     }
     let angles: Option<Vec<Angles>> = list.iter().copied().map(Angles::from_direction).collect();
     let Some(angles) = angles else {

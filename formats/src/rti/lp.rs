@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use crate::file_name::{inside_folder, repeated};
+use crate::file_name::{inside_folder, parts_of, repeated};
+use crate::text::utf8;
 use crate::{Angles, Error, ErrorKind, Limits, Result};
 
 /// The lights of a fixed view, in the list's order.
@@ -20,6 +21,9 @@ pub struct Lamp {
     /// Path inside the list's folder, parts separated by `/`; `None` in lists without names, whose lights
     /// belong to the sorted pictures of the folder.
     pub file: Option<String>,
+    /// All folders that the list names and the file, separated by `/`, without a drive and what `..` climbs out of: where a
+    /// set was moved from another machine, the longest end that is there decides. Empty in lists without names.
+    pub path: String,
     /// Direction to the light.
     pub light: Angles,
     /// Line in the list, the first is 1.
@@ -30,7 +34,8 @@ pub struct Lamp {
 ///
 /// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y
 /// z, the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by
-/// spaces or tabs, lines end in LF, CRLF or CR. A count that is wrong or not there is a warning. A second
+/// spaces or tabs, lines end in LF, CRLF or CR. The text is UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal
+/// point or, all of them that have a fraction, a decimal comma. A count that is wrong or not there is a warning. A second
 /// variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another
 /// machine) the last part counts, so a list never reaches out of its folder.
 ///
@@ -39,10 +44,11 @@ pub struct Lamp {
 /// surface, names on some lines only, no usable name, a name twice. [`ErrorKind::Limit`]: more lights than
 /// [`Limits::max_directions`].
 pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = utf8(bytes)?;
     let mut count = None;
     let mut lamps: Vec<Lamp> = Vec::new();
-    for (number, line) in lines(bytes) {
+    let mut marks = Marks::default();
+    for (number, line) in lines(&bytes) {
         let text = String::from_utf8_lossy(line);
         let text = text.trim();
         if text.is_empty() {
@@ -56,7 +62,7 @@ pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
             let found = format!("more than {} lights", limits.max_directions);
             return Err(Error::new(ErrorKind::Limit, found, "a list within the limit of directions"));
         }
-        let lamp = lamp(text, number)?;
+        let lamp = lamp(text, number, &mut marks)?;
         if let Some(first) = lamps.first()
             && first.file.is_some() != lamp.file.is_some()
         {
@@ -95,7 +101,7 @@ fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
 }
 
 /// Reads a line that is not blank.
-fn lamp(text: &str, line: usize) -> Result<Lamp> {
+fn lamp(text: &str, line: usize, marks: &mut Marks) -> Result<Lamp> {
     let wrong = |found: String, expected: Cow<'static, str>| {
         Err(Error::malformed(format!("line {line}: {found}"), expected))
     };
@@ -103,7 +109,7 @@ fn lamp(text: &str, line: usize) -> Result<Lamp> {
     let mut vector = [0.0; 3];
     for component in vector.iter_mut().rev() {
         let number = name.rsplit(char::is_whitespace).next().unwrap_or(name);
-        let Ok(value) = number.parse::<f64>() else {
+        let Some(value) = marks.number(number) else {
             return wrong(
                 format!("{number:?} in {text:?}"),
                 "a file name (or none) and three numbers x y z".into(),
@@ -112,18 +118,48 @@ fn lamp(text: &str, line: usize) -> Result<Lamp> {
         *component = value;
         name = name.strip_suffix(number).unwrap_or_default().trim_end();
     }
+    if marks.point && marks.comma {
+        return wrong(
+            format!("a decimal comma in a list with decimal points, or the other way round, in {text:?}"),
+            "one of the two in all lines".into(),
+        );
+    }
     let light = match Angles::from_vector(vector) {
         Ok(light) => light,
         Err(expected) => return wrong(format!("the light {vector:?}"), expected.into()),
     };
     if name.is_empty() {
-        return Ok(Lamp { file: None, light, line });
+        return Ok(Lamp { file: None, path: String::new(), light, line });
     }
     // Names in another encoding than UTF-8 are of no use, but their folders do not matter.
     match inside_folder(name).filter(|file| !file.contains(char::REPLACEMENT_CHARACTER)) {
-        Some(file) => Ok(Lamp { file: Some(file), light, line }),
+        Some(file) => Ok(Lamp { file: Some(file), path: parts_of(name), light, line }),
         None => {
             wrong(format!("the name {name:?}"), "the name of a file in the list's folder, as UTF-8".into())
+        }
+    }
+}
+
+/// The decimal marks that a list has used so far.
+#[derive(Debug, Default)]
+struct Marks {
+    point: bool,
+    comma: bool,
+}
+
+impl Marks {
+    /// A number with a decimal point or a decimal comma.
+    fn number(&mut self, text: &str) -> Option<f64> {
+        self.point |= text.contains('.');
+        match text.split_once(',') {
+            None => text.parse().ok(),
+            Some((whole, fraction)) => {
+                self.comma = true;
+                let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+                let exponentless = fraction.split(['e', 'E']).next().is_some_and(digits);
+                let plain = digits(whole.trim_start_matches(['-', '+'])) && exponentless;
+                format!("{whole}.{fraction}").parse().ok().filter(|_| plain)
+            }
         }
     }
 }
@@ -154,9 +190,16 @@ mod tests {
         for end in ["\n", "\r\n", "\r"] {
             let list = list(&text.replace('\n', end));
             assert_eq!(list.warnings, [""; 0]);
-            let expected = [("a file 1.jpg", angles(45.0, 270.0), 2), ("b 2.JPG", angles(0.0, 0.0), 3)];
-            let expected =
-                expected.map(|(file, light, line)| Lamp { file: Some(file.to_owned()), light, line });
+            let expected = [
+                ("a file 1.jpg", "a file 1.jpg", angles(45.0, 270.0), 2),
+                ("b 2.JPG", "my scans/b 2.JPG", angles(0.0, 0.0), 3),
+            ];
+            let expected = expected.map(|(file, path, light, line)| Lamp {
+                file: Some(file.to_owned()),
+                path: path.to_owned(),
+                light,
+                line,
+            });
             assert_eq!(list.lamps, expected, "{end:?}");
         }
     }
@@ -184,6 +227,26 @@ mod tests {
         let list = read_lp(b"1\n/home/j\xfcrgen/a.png 0 0 1", &limits).unwrap();
         assert_eq!(list.lamps[0].file.as_deref(), Some("a.png"));
         assert!(read_lp(b"1\nj\xfcrgen.png 0 0 1", &limits).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[test]
+    fn decimal_commas_are_read_where_no_point_is() {
+        let commas = list("3\nphoto1.png 0,707106781 0 0,707106781\nb, c.png -1,5 +0,0 1,5e0\nd.png 0 0 1\n");
+        let points = list("3\nphoto1.png 0.707106781 0 0.707106781\nb, c.png -1.5 +0.0 1.5e0\nd.png 0 0 1\n");
+        assert_eq!(commas, points);
+        for text in [
+            "1\na 0,5 0.5 1\n",
+            "1\na 1,000.5 0 1\n",
+            "2\na 0,5 0 1\nb 0.5 0 1\n",
+            "1\na 0,1,2 0 1\n",
+            "1\na ,5 0 1\n",
+            "1\na 5, 0 1\n",
+            "1\na.png,0.1,0.2,0.3\n",
+            "1\na 0.1, 0.2, 0.3\n",
+        ] {
+            let error = read_lp(text.as_bytes(), &Limits::default()).unwrap_err();
+            assert!(error.to_string().contains("line "), "{text:?}: {error}");
+        }
     }
 
     #[test]

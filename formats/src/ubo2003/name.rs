@@ -1,7 +1,7 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
-use crate::fields::NumberPrefix;
+use crate::fields::{NumberPrefix, digits_are_left};
 use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
@@ -21,7 +21,8 @@ pub struct ImageName {
 /// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif,
 /// tiff, hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or
 /// without decimals; theta in 0..=90, phi any (it may be negative). Case, order, separators, and whatever
-/// else the name holds, do not matter.
+/// else the name holds, do not matter, but that no digits may be left right behind an angle (`tl7,5`, `tl7_5`): see
+/// [`half_read`].
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{Angles, parse_name};
@@ -33,12 +34,24 @@ pub struct ImageName {
 /// assert_eq!(parse_name("readme.txt"), None);
 /// ```
 pub fn parse_name(path: &str) -> Option<ImageName> {
+    if half_read(path) {
+        return None;
+    }
     let stem = base(picture_stem(path)?);
     Some(ImageName {
         number: leading_number(stem),
         light: Angles::new(angle(stem, *b"tl")?, angle(stem, *b"pl")?)?,
         view: Angles::new(angle(stem, *b"tv")?, angle(stem, *b"pv")?)?,
     })
+}
+
+/// Whether a picture's name has the labels, but a number that would be read by half: `tl7,5`, `tl7p5`, `tl7-5`, `tl7_5`,
+/// `tl4.5e+01`. Such a name is no image, and a caller does well not to pass over it.
+pub fn half_read(path: &str) -> bool {
+    let Some(stem) = picture_stem(path).map(base) else { return false };
+    let labels = [*b"tl", *b"pl", *b"tv", *b"pv"];
+    let numbers: Option<Vec<(f64, &str)>> = labels.iter().map(|&key| angle_and_rest(stem, key)).collect();
+    numbers.is_some_and(|numbers| numbers.iter().any(|(_, rest)| digits_are_left(rest)))
 }
 
 fn leading_number(stem: &str) -> Option<u32> {
@@ -49,19 +62,23 @@ fn leading_number(stem: &str) -> Option<u32> {
 /// The number after `key`, which must occur once. A key starts where no letter stands before it, so `atl5` has
 /// none.
 fn angle(stem: &str, key: [u8; 2]) -> Option<f64> {
+    angle_and_rest(stem, key).map(|(angle, _)| angle)
+}
+
+/// That number, and what follows it.
+fn angle_and_rest(stem: &str, key: [u8; 2]) -> Option<(f64, &str)> {
     let bytes = stem.as_bytes();
     let is_key = |(_, pair): &(usize, &[u8])| pair.eq_ignore_ascii_case(&key);
     let starts_word = |(at, _): &(usize, &[u8])| {
         let before = at.checked_sub(1).and_then(|at| bytes.get(at));
         !before.is_some_and(|byte| byte.is_ascii_alphabetic() || !byte.is_ascii())
     };
-    let number = |text: &str| text.get(..NumberPrefix::of(text)?.all)?.parse().ok();
-    let mut numbers = bytes
-        .windows(2)
-        .enumerate()
-        .filter(is_key)
-        .filter(starts_word)
-        .filter_map(|(at, _)| number(stem.get(at.checked_add(2)?..)?));
+    let mut numbers =
+        bytes.windows(2).enumerate().filter(is_key).filter(starts_word).filter_map(|(at, _)| {
+            let text = stem.get(at.checked_add(2)?..)?;
+            let (number, rest) = text.split_at_checked(NumberPrefix::of(text)?.all)?;
+            Some((number.parse().ok()?, rest))
+        });
     match (numbers.next(), numbers.next()) {
         (Some(number), None) => Some(number),
         _ => None,
@@ -173,8 +190,26 @@ mod tests {
             "tl-15 pl000 tv000 pv000.jpg",
             "xtl15 pl000 tv000 pv000.jpg",
             "étl15 pl000 tv000 pv000.jpg",
+            "tl7,5_pl0_tv22,5_pv90.jpg",
+            "tl7_pl0_tv22_pv90,5.jpg",
+            "tl7p5_pl0_tv22p5_pv90.jpg",
+            "tl7-5_pl0_tv22-5_pv90.jpg",
+            "tl7_5_pl0_tv22_5_pv90.jpg",
+            "tl4.5e+01_pl0_tv22_pv90.jpg",
         ] {
             assert_eq!(parse_name(name), None, "{name:?}");
+        }
+    }
+
+    #[test]
+    fn names_that_would_be_read_by_half() {
+        for name in ["a/tl7,5_pl0_tv22,5_pv90.jpg", "tl7_pl0_tv22_pv90_5.png", "tl7 pl0 tv2 5 pv90.png"] {
+            assert!(half_read(name), "{name:?}");
+        }
+        for name in
+            ["00000 tl007 pl000 tv022 pv090.jpg", "tl7.5_pl0_tv22_pv90 b.jpg", "tl7,5.jpg", "a5.jpg", "x"]
+        {
+            assert!(!half_read(name), "{name:?}");
         }
     }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use flate2::{Decompress, FlushDecompress, Status};
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive};
 
-use super::{crc32, name, translate};
+use super::{cp437, crc32, name, translate};
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Deflate cannot expand one byte to more than 1032 (a match of 258 bytes in two bits).
@@ -72,7 +72,7 @@ impl ZipIndex {
     /// # Errors
     ///
     /// - [`ErrorKind::Malformed`]: not a zip; cut; the two headers of an entry disagree; the number of
-    ///   entries is not the one declared; a name twice, not UTF-8, absolute or climbing by `..`;
+    ///   entries is not the one declared; a name twice, not UTF-8 though it says so, absolute or climbing by `..`;
     ///   entries that overlap; a size that no compression method reaches.
     /// - [`ErrorKind::Unsupported`]: an encrypted entry, a symbolic link, or a method other than stored and deflate.
     /// - [`ErrorKind::Limit`]: more entries, or a larger one, than `limits` allows.
@@ -220,11 +220,15 @@ fn read_entry(
     limits: &Limits,
 ) -> Result<ZipEntry> {
     let raw_name = record.file_path();
-    let Ok(entry_name) = std::str::from_utf8(raw_name.as_bytes()) else {
-        let found = format!("the entry name {}", raw_name.as_bytes().escape_ascii());
-        return Err(Error::malformed(found, "UTF-8").at(record.central_directory_offset()));
+    let entry_name: Cow<'_, str> = match std::str::from_utf8(raw_name.as_bytes()) {
+        Ok(name) => Cow::Borrowed(name),
+        Err(_) if !record.flags().is_utf8() => Cow::Owned(cp437::decode(raw_name.as_bytes())),
+        Err(_) => {
+            let found = format!("the entry name {}", raw_name.as_bytes().escape_ascii());
+            return Err(Error::malformed(found, "UTF-8").at(record.central_directory_offset()));
+        }
     };
-    check_entry(archive, record, entry_name, limits).map_err(|e| e.in_entry(entry_name))
+    check_entry(archive, record, &entry_name, limits).map_err(|e| e.in_entry(&entry_name))
 }
 
 fn check_entry(
@@ -277,7 +281,7 @@ fn check_entry(
         translate(e, "a local header and all data of the entry").at(record.local_header_offset())
     })?;
     let header = local.local_header();
-    if header.file_path().as_bytes() != entry_name.as_bytes() {
+    if header.file_path().as_bytes() != record.file_path().as_bytes() {
         return Err(Error::malformed(
             format!("the local name {}", header.file_path().as_bytes().escape_ascii()),
             "the name in the directory",

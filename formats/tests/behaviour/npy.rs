@@ -26,7 +26,7 @@ fn directions_of(count: u32) -> Vec<Direction> {
 }
 
 fn beside() -> Beside {
-    Beside { views: Some(directions_of(2)), lights: Some(directions_of(3)) }
+    Beside { views: Some(directions_of(2)), lights: Some(directions_of(3)), channels: None }
 }
 
 fn open(bytes: &[u8]) -> btfkit_formats::Result<Archive> {
@@ -125,7 +125,8 @@ fn big_endian_and_double_precision() {
 #[test]
 fn directions_must_be_given_and_fit() {
     let bytes = file(SampleType::U8);
-    let of = |views, lights| Archive::open(&bytes, Beside { views, lights }, &Limits::default());
+    let of =
+        |views, lights| Archive::open(&bytes, Beside { views, lights, channels: None }, &Limits::default());
     let (two, three) = (Some(directions_of(2)), Some(directions_of(3)));
     for (result, reason) in [
         (of(None, three.clone()), "NAME.views.npy"),
@@ -151,8 +152,12 @@ fn published_counts_are_named_but_not_assumed() {
         assert!(error.to_string().contains(name), "{error}");
         let list =
             lists::published(name).unwrap().into_iter().map(btfkit_formats::Angles::direction).collect();
-        let archive =
-            Archive::open(&bytes, Beside { views: None, lights: Some(list) }, &Limits::default()).unwrap();
+        let archive = Archive::open(
+            &bytes,
+            Beside { views: None, lights: Some(list), channels: None },
+            &Limits::default(),
+        )
+        .unwrap();
         assert_eq!(archive.contents().views, [Direction { theta_rad: 0.0, phi_rad: 0.0 }]);
         assert!(archive.contents().assumptions.iter().any(|text| text.contains("frontal")));
     }

@@ -68,9 +68,19 @@ fn names_that_escape_are_refused() {
         let error = open(&[RawEntry::stored(name, b"x")]).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Malformed, "{name:?}: {error}");
     }
-    let latin1 = RawEntry { name: b"\xe4.jpg".to_vec(), ..RawEntry::stored("", b"x") };
-    let error = open(&[latin1]).unwrap_err();
-    assert!(error.to_string().contains("UTF-8"), "{error}");
+}
+
+#[test]
+fn names_without_the_flag_of_utf8_are_of_code_page_437() {
+    let name = |name: &[u8]| RawEntry { name: name.to_vec(), ..RawEntry::stored("", b"x") };
+    let zip = raw_zip(&[name(b"Gr\x81n/a.jpg"), name("Grün/b.jpg".as_bytes())]);
+    let index = ZipIndex::open(&zip, &Limits::default()).unwrap();
+    let names: Vec<&str> = index.entries().iter().map(|entry| entry.name()).collect();
+    assert_eq!(names, ["Grün/a.jpg", "Grün/b.jpg"]);
+    assert_eq!(*index.read(&zip, 0).unwrap(), *b"x");
+    // What the name becomes must be safe, and no name twice.
+    assert!(open(&[name(b"../\x81")]).is_err());
+    assert!(open(&[name(b"\x81"), name("ü".as_bytes())]).is_err());
 }
 
 #[test]

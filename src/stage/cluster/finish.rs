@@ -53,7 +53,7 @@ impl Plan {
             brdf: self.brdf(),
             centres: self.arrangement.plain(centres),
             sources,
-            distance: context.install(|| distance_matrix(&codes, &self.arrangement)),
+            distance: context.compute(|| distance_matrix(&codes, &self.arrangement)),
             representatives,
         };
         self.model.write_clusters(&arrays)?;

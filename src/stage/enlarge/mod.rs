@@ -225,7 +225,7 @@ impl Plan {
                 unit: self.rule.units(&self.subject).0,
                 found: units.found,
                 written: units.written,
-                verdict: context.install(|| subject.verdict(&enlarged, method))?,
+                verdict: context.compute(|| subject.verdict(&enlarged, method))?,
             })
         };
         self.outputs.iter().zip(units).map(report).collect()

@@ -195,7 +195,7 @@ impl Rule for Paper {
         let kernel = Kernel::fastest();
         let normals = subject.model.normals()?;
         let shared = Shared {
-            nearest: context.install(|| NearestNormals::new(&normals, self.candidates, kernel)),
+            nearest: context.compute(|| NearestNormals::new(&normals, self.candidates, kernel)),
             scan: Scan::new(subject.model.index()?, &subject.model.distance()?),
             kernel,
         };

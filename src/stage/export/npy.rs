@@ -1,8 +1,8 @@
-//! One array for numpy, [view, light, y, x, channel], and two with its directions.
+//! One array for numpy, [view, light, y, x, channel], two with its directions, and the names of its channels.
 
 use std::io::Write;
 
-use btfkit_formats::npy::{directions_file, header, sample_bytes};
+use btfkit_formats::npy::{channels_file, directions_file, header, sample_bytes};
 
 use super::{Options, Written, for_each_view};
 use crate::color::Transfer;
@@ -21,6 +21,8 @@ pub(super) fn write(measurement: &Measurement, options: &Options, context: &Cont
         let beside = options.output.with_extension(format!("{kind}.npy"));
         output::write_new(&beside, context.existing, &directions_file(list))?;
     }
+    let beside = options.output.with_extension("channels.txt");
+    output::write_new(&beside, context.existing, &channels_file(&description.channels))?;
     let made = output::write_whole(&options.output, context.existing, |output| {
         output.write_all(&header(shape.map(|n| n as u64), description.sample_type)).map_err(failed)?;
         for_each_view(measurement, context, |_, images| {

@@ -97,7 +97,7 @@ impl Plan {
         let boundary = boundary_of(&tile);
         let options = mrf::Options { kind, levels, gains, boundary };
         let surface =
-            context.install(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
+            context.compute(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
         self.model.write_surface(&surface)?;
         let report = FieldReport::new(&surface);
         self.model.finish(Stage::Fit, &self.recipe, &report, context)?;
@@ -114,7 +114,7 @@ impl Plan {
 pub fn compare(model: &Path, context: &Context<'_>) -> Result<statistics::Comparison> {
     let model = Model::open(model)?;
     let (tile, normals, surface) = (model.tile()?, model.normals()?, model.surface()?);
-    context.install(|| statistics::Comparison::of(&surface, tile.size, normals, boundary_of(&tile)))
+    context.compute(|| statistics::Comparison::of(&surface, tile.size, normals, boundary_of(&tile)))
 }
 
 /// What lies beyond the border of a tile's normal map.

@@ -365,7 +365,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
     let tile = tile_picture(model, options, context)?;
     let appearance = of_stage(model, Stage::Appearance, Model::appearance)?;
     let index = of_stage(model, Stage::Cluster, Model::index)?;
-    let plane = context.install(|| Plane::new(tile.size, &index, &appearance, Kernel::fastest()))?;
+    let plane = context.compute(|| Plane::new(tile.size, &index, &appearance, Kernel::fastest()))?;
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;

@@ -90,7 +90,7 @@ struct Found {
 /// pairs that were not measured, and those of reading.
 pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)> {
     let (subject, model) =
-        context.install(|| Subject::open(&options.subject, options.model.as_deref(), options.size))?;
+        context.compute(|| Subject::open(&options.subject, options.model.as_deref(), options.size))?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
     let description = measurement.description();
     let pairs = pairs_of(options, &measurement)?;
@@ -134,12 +134,12 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)
         context.check_stop()?;
         let real: Vec<Lightness> =
             crops.reals.iter().map(|&window| real_crop(&measurement, pair, window)).collect::<Result<_>>()?;
-        found.push(context.install(|| judge_pair(&subject, &material, &crops, codes, &real, &periods))?);
+        found.push(context.compute(|| judge_pair(&subject, &material, &crops, codes, &real, &periods))?);
         context.progress.advance(1);
     }
     context.progress.end();
     let wavy = match codes.first() {
-        Some(codes) => context.install(|| wavy(&subject, &material, codes))?,
+        Some(codes) => context.compute(|| wavy(&subject, &material, codes))?,
         None => [None; 2],
     };
     let normals = normals::judge(&subject, &model, &measurement, &material, &crops, context)?;

@@ -72,7 +72,7 @@ pub(super) fn judge(
         })
     };
     // A surface without relief has normals without contrast.
-    match context.install(|| Ok((judged(0)?, judged(1)?))) {
+    match context.compute(|| Ok((judged(0)?, judged(1)?))) {
         Ok((x, y)) => Ok(Normals::Judged {
             against: "normals of the real crops, measured".to_owned(),
             x: Box::new(x),

@@ -42,7 +42,7 @@ pub(super) fn look(
         context.check_stop()?;
         let rows = subject.band_rows().min(size.height - top);
         let window = Window { y: top, x: 0, size: Size::new(rows, size.width) };
-        let texels = context.install(|| subject.texels(window, material.clusters, material.tile))?;
+        let texels = context.compute(|| subject.texels(window, material.clusters, material.tile))?;
         for row in 0..rows {
             let range = row * size.width..(row + 1) * size.width;
             let index = &texels.index[range.clone()];

@@ -117,7 +117,7 @@ impl Plan {
         let description = self.measurement.description();
         let plane = description.size;
         let features = features(&self.measurement, context)?;
-        let (tile, patch, lattice) = context.install(|| self.tile(&features))?;
+        let (tile, patch, lattice) = context.compute(|| self.tile(&features))?;
         let report = Report {
             size: [tile.size.height, tile.size.width],
             wraps: tile.wraps,

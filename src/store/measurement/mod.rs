@@ -233,6 +233,11 @@ impl Measurement {
         &self.description
     }
 
+    /// How its chunks are packed.
+    pub fn codec(&self) -> Chain {
+        self.codec
+    }
+
     /// Digest of the recipe that made it.
     pub fn digest(&self) -> &str {
         &self.digest
@@ -409,6 +414,7 @@ mod tests {
     use crate::color::{LightnessCodes, Transfer};
     use crate::random::Hash;
     use crate::store::gather::{Images, images_of_texels};
+    use btfkit_formats::Direction;
     use btfkit_formats::f16;
 
     fn description(size: Size, sample_type: SampleType) -> Description {

@@ -69,7 +69,7 @@ impl Import {
         let folder = self.into.clone().unwrap_or_default();
         // Misspelt, the last of many archives is not to become a store.
         if let Some(absent) =
-            self.paths.iter().find(|path| !path.exists() && !(self.into.is_none() && is_store(path)))
+            self.paths.iter().find(|path| !(path.exists() || self.into.is_none() && is_store(path)))
         {
             let error = Error::missing(format!("{}: no such archive", absent.display()));
             return Err(

@@ -100,7 +100,7 @@ mod tests {
         assert_eq!(fs::read_to_string(index.join(FILE)).unwrap(), "../../models/a.model.zarr");
         let found = places(&index, Some("a.model.zarr"));
         assert_eq!(found[0].canonicalize().unwrap(), model);
-        assert_eq!(found[1..], [beside.clone()]);
+        assert_eq!(found[1..], std::slice::from_ref(&beside)[..]);
         // Noted again from beside it, nothing is left to note.
         note(&index, &beside).unwrap();
         assert!(!index.join(FILE).exists());

@@ -70,6 +70,14 @@ impl Plan {
         json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Normals, &self.recipe)
+    }
+
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe, context)? else {

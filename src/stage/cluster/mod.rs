@@ -302,6 +302,14 @@ impl Plan {
         })
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Cluster, &self.recipe)
+    }
+
     fn method(&self, columns: usize, deadline: Option<Instant>) -> Method {
         let Options { centre: rule, limits, .. } = self.options;
         Method { rule, limits, columns, kernel: Kernel::fastest(), deadline }

@@ -17,6 +17,7 @@ pub mod mapped;
 pub mod measurement;
 pub mod metadata;
 pub mod model;
+pub(crate) mod model_place;
 pub mod output;
 pub mod passes;
 mod read;
@@ -76,8 +77,11 @@ pub struct Store {
     /// Version of its layout.
     format: u64,
     /// Our attributes of the root as they were read last, and of which file: they are asked for at every array.
-    known: Arc<Mutex<Option<(Stamp, Map<String, Value>)>>>,
+    known: Arc<Mutex<Option<Known>>>,
 }
+
+/// Attributes of a file as they were read.
+type Known = (Stamp, Map<String, Value>);
 
 /// What tells a file from the one that was at its place before: files are replaced, never written over.
 #[derive(Clone, Copy, PartialEq, Eq)]

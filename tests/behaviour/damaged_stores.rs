@@ -117,8 +117,9 @@ fn use_it(path: &Path, context: &Context<'_>) {
     };
     let show = |subject: Subject| -> Result<()> {
         let scene = Scene::open(&picture(subject), context)?;
-        for rows in scene.bands(1 << 24)?.take(2) {
-            scene.read(rows, context)?;
+        let height = scene.size().height;
+        for first in (0..height).step_by(64).take(2) {
+            scene.read(first..(first + 64).min(height), context)?;
         }
         Ok(())
     };
@@ -228,7 +229,7 @@ fn change(document: &mut Value, place: &str, to: Option<&Value>) -> bool {
             let old = members.remove(&name).unwrap();
             match to {
                 Some(Value::String(text)) if text.ends_with(':') => {
-                    drop(members.insert(format!("{name}x"), old))
+                    drop(members.insert(format!("{name}x"), old));
                 }
                 Some(value) if *value == old => return false,
                 Some(value) => drop(members.insert(name, value.clone())),

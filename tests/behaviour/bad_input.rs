@@ -115,7 +115,7 @@ fn a_truncated_zip_and_a_file_that_is_none_are_refused() {
     std::fs::write(&text, "no archive at all\n".repeat(100)).unwrap();
     let told = fail(btf().arg("import").args([&text, &folder.path().join("store.zarr")]), 65);
     assert!(told.contains("notes.txt") && told.contains("expected"), "{told}");
-    fail(btf().arg("import").args([&folder.path().join("nothing.zip"), &folder.path().join("s")]), 74);
+    fail(btf().arg("import").args([&folder.path().join("nothing.zip"), &folder.path().join("s")]), 66);
 }
 
 #[test]

@@ -63,6 +63,14 @@ impl<'a> Attributes<'a> {
         value.map(Some).map_err(|error| self.error(name, error))
     }
 
+    /// The same, of an attribute that must be of a type that is read.
+    pub(super) fn required(&self, name: &str) -> Result<Value> {
+        match self.value(name)? {
+            Some(value) => Ok(value),
+            None => Err(self.no_text(name, &self.open(name)?.1, MAX_TEXT_BYTES)),
+        }
+    }
+
     /// One text.
     pub(super) fn text(&self, name: &str) -> Result<String> {
         let (attribute, kind) = self.open(name)?;

@@ -42,7 +42,7 @@ impl Texels {
             file.error(format!("attribute {name}: got {found}, expected {expected}"))
         };
         for (name, expected) in [("kind", Value::from(KIND)), ("format", Value::from(FORMAT))] {
-            let found = root.value(name)?.unwrap_or_default();
+            let found = root.required(name)?;
             if found != expected {
                 return Err(wrong(name, &found, expected.to_string()));
             }

@@ -70,6 +70,14 @@ impl Plan {
         json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Normals, &self.recipe)
+    }
+
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe, context)? else {
@@ -114,7 +122,7 @@ pub(crate) fn of_window(
     };
     let mut normals = Vec::with_capacity(window.size.texels());
     let band_bytes = (BAND_ROWS * window.size.width * description.texel_bytes()) as u64;
-    let in_flight = read_ahead::in_flight(context.memory_bytes, band_bytes);
+    let in_flight = read_ahead::in_flight(context.work_bytes(), band_bytes);
     let read = |top: usize| {
         let rows = BAND_ROWS.min(window.size.height - top);
         let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };

@@ -7,7 +7,7 @@ const PACKED: &str = "unpack it to a folder, or pack it as a zip";
 const OTHER: &str = "it does not hold one picture for each view and light";
 
 /// How a file begins, what it is, and the way out.
-const STARTS: [(usize, &[u8], &str, &str); 40] = [
+const STARTS: [(usize, &[u8], &str, &str); 41] = [
     (8, b"WEBP", "a WebP picture", PICTURE),
     (4, b"ftypavif", "an AVIF picture", PICTURE),
     (4, b"ftypavis", "an AVIF sequence", PICTURE),
@@ -46,6 +46,12 @@ const STARTS: [(usize, &[u8], &str, &str); 40] = [
     (0, b"\xFD7zXZ\0", "an xz file (tar.xz?)", PACKED),
     (257, b"ustar", "a tar archive", PACKED),
     (0, b"MATLAB 5.0", "a MATLAB file", "save its arrays as .npy, or its images as pictures"),
+    (
+        0,
+        b"#HSH",
+        "a map of hemispherical harmonics (HSH)",
+        "it is a fit and not the photographs: import those",
+    ),
     (0, b"PTM_1.", "a polynomial texture map (PTM)", "it is a fit and not the photographs: import those"),
     (0, b"\x5A\0\0\0\x5A\0\0\0\xB4\0\0\0", "a BRDF of the MERL database", OTHER),
 ];
@@ -62,7 +68,7 @@ const RAW_ENDINGS: [(&str, &str); 8] = [
     ("iiq", "a Phase One raw file"),
 ];
 
-/// What a file is, by its first bytes (some hundred) or its name, and what to do about it; `None` if it is nothing known,
+/// What a file is, by its first bytes or its name, and what to do about it; `None` if it is nothing known,
 /// or a picture that is read.
 ///
 /// ```

@@ -227,6 +227,27 @@ fn densities_sum_to_one() {
 }
 
 #[test]
+fn what_is_said_that_changes_nothing_is_accepted() {
+    let mut sketch = grey();
+    sketch.scale_6d = reals(3, 1.0, 2.0, &[64, 0, 30, 200, 240, 0]);
+    let bytes = sketch.bytes();
+    let open = |text: &str| Database::open(&bytes, &ZeroBytes::parse(text).unwrap(), &Limits::default());
+    let plain = open("").unwrap();
+    let image = plain.read_images(&bytes, 0, 0..81).unwrap();
+    // Tables of one value, and a byte that is not ambiguous.
+    for text in ["PDF3Dscale 0 0 1.0", "PDF1Dslice 0 4 0.2", "PDF6Dscale 0 0 1.25", "PDF2Dscale 0 0 1.000001"]
+    {
+        let database = open(text).unwrap();
+        assert_eq!(database.read_images(&bytes, 0, 0..81).unwrap(), image, "{text}");
+    }
+    for text in ["PDF3Dscale 0 0 2.0", "PDF1Dslice 0 4 0.3", "PDF3Dscale 99 0 1.0", "PDF3Dscale 0 99 1.0"] {
+        let error = open(text).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Argument, "{text}");
+        assert!(error.to_string().contains(text.trim_end_matches(".0")), "{error}");
+    }
+}
+
+#[test]
 fn what_is_said_of_other_bytes_is_refused() {
     let mut sketch = grey();
     sketch.scale_6d = reals(3, 1.0, 2.0, &[20, 0, 30, 200, 240, 0]);

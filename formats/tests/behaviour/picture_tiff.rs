@@ -123,6 +123,7 @@ fn what_is_not_read_is_refused_with_its_reason() {
         (262, vec![3], "photometric interpretation 3"),
         (262, vec![5], "photometric interpretation 5"),
         (262, vec![6], "photometric interpretation 6"),
+        (262, vec![32803], "a camera's raw picture"),
         (266, vec![2], "fill order"),
         (317, vec![2], "predictor 2"),
         (258, vec![12; 3], "12 bits"),

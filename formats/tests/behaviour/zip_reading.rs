@@ -75,7 +75,7 @@ fn names_without_the_flag_of_utf8_are_of_code_page_437() {
     let name = |name: &[u8]| RawEntry { name: name.to_vec(), ..RawEntry::stored("", b"x") };
     let zip = raw_zip(&[name(b"Gr\x81n/a.jpg"), name("Grün/b.jpg".as_bytes())]);
     let index = ZipIndex::open(&zip, &Limits::default()).unwrap();
-    let names: Vec<&str> = index.entries().iter().map(|entry| entry.name()).collect();
+    let names: Vec<&str> = index.entries().iter().map(ZipEntry::name).collect();
     assert_eq!(names, ["Grün/a.jpg", "Grün/b.jpg"]);
     assert_eq!(*index.read(&zip, 0).unwrap(), *b"x");
     // What the name becomes must be safe, and no name twice.

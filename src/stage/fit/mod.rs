@@ -83,6 +83,14 @@ impl Plan {
         json!({"stage": "fit", "model": self.model.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Fit, &self.recipe)
+    }
+
     /// Fits the field, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
         let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe, context)? else {

@@ -101,6 +101,17 @@ impl Plan {
         json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        if !self.model.join("zarr.json").exists() {
+            return Ok(false);
+        }
+        Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe)
+    }
+
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let model = Model::create(&self.model, context)?;

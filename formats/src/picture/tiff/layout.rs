@@ -275,6 +275,12 @@ fn interpretation(directory: &Directory<'_>, stored: u64) -> Result<(bool, bool)
         (2, 4, true) => Ok((true, true)),
         (1, 2, true) => Ok((false, true)),
         (1, _, false) if !extra.iter().any(|&meaning| meaning != 0) => Ok((false, false)),
+        // TIFF/EP and DNG: a mosaic of colour filters, or what is left when it is filled in.
+        (photometric @ (32803 | 34892), ..) => Err(unsupported(
+            format!("a camera's raw picture (photometric interpretation {photometric})"),
+            "grey (1) or RGB (2); convert it to a TIFF of 16 bits, the same way for all pictures",
+        )
+        .at(directory.at)),
         (photometric, ..) => {
             let found = format!(
                 "photometric interpretation {photometric}, {stored} channels, extra samples {extra:?}"

@@ -62,7 +62,11 @@ impl Writer {
         Temporary::sweep_beside(path);
         let temporary = mapped::temporary_name(path);
         // The newer layout of metadata has checksums throughout; the older one has none, and the C library believes it.
-        let builder = File::with_options().with_fapl(|access| access.libver_v110()).clone();
+        // Without times the same measurement gives the same bytes.
+        let builder = File::with_options()
+            .with_fapl(|access| access.libver_v110())
+            .with_fcpl(|create| create.obj_track_times(false))
+            .clone();
         let file = builder.create_excl(&temporary).map_err(|error| {
             // It may have got as far as the file.
             let _ = fs::remove_file(&temporary);
@@ -134,7 +138,8 @@ impl Writer {
             })
             .collect();
         let builder = file.new_dataset::<T>().shape(shape.to_vec()).chunk(chunk);
-        let dataset = builder.shuffle().deflate(DEFLATE_LEVEL).fletcher32().create(name)?;
+        let dataset =
+            builder.obj_track_times(false).shuffle().deflate(DEFLATE_LEVEL).fletcher32().create(name)?;
         let names = ["view", "y", "x", "light", "channel"];
         attribute::write_labels(&dataset, &names[..shape.len()])?;
         Ok(dataset)
@@ -228,8 +233,13 @@ fn write_directions(file: &File, which: usize, directions: &[Direction]) -> hdf5
     let angles: Vec<f64> = directions.iter().flat_map(|d| [d.theta_rad, d.phi_rad]).collect();
     let shape = [directions.len(), 2];
     // In a chunk, for the sake of a checksum.
-    let dataset =
-        file.new_dataset::<f64>().shape(shape).chunk(shape).fletcher32().create(DIRECTIONS[which])?;
+    let dataset = file
+        .new_dataset::<f64>()
+        .obj_track_times(false)
+        .shape(shape)
+        .chunk(shape)
+        .fletcher32()
+        .create(DIRECTIONS[which])?;
     dataset.write(ArrayView2::from_shape((directions.len(), 2), &angles)?)?;
     attribute::write(&dataset, "units", &"rad".into())?;
     attribute::write_texts(&dataset, "angles", &["theta", "phi"])?;

@@ -152,7 +152,7 @@ fn outputs(fixture: &Fixture, folder: &Path) -> Vec<(Vec<String>, PathBuf, Vec<&
     add(&["export", &measurement, "OUT", "--to", "exr"], "exr", &[]);
     #[cfg(feature = "hdf5")]
     add(&["export", &measurement, "OUT"], "e.h5", &[]);
-    add(&["export", &enlarged, "OUT", "--deepzoom"], "d.dzi", &["--exposure", "2"]);
+    add(&["export", &enlarged, "OUT", "--deepzoom"], "d.dzi", &["--overlap", "2"]);
     add(&["image", &model, "--out", "OUT"], "i.png", &["--exposure", "2"]);
     add(&["image", &enlarged, "--out", "OUT"], "i.exr", &["--exposure", "2"]);
     add(&["curve", &measurement, &model, "--most", "4", "--out", "OUT"], "c.png", &["--most", "2"]);
@@ -459,7 +459,7 @@ fn threads_have_bounds() {
     // Threads that the system refuses, and memory that there is not: an error, no panic and no abort.
     let output = limited("ulimit -v 600000", &arguments("1000")).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(matches!(output.status.code(), Some(0..=2)) && !told.contains("panicked"), "{output:?}");
+    assert!(matches!(output.status.code(), Some(0..=2 | 74)) && !told.contains("panicked"), "{output:?}");
 }
 
 #[test]

@@ -34,5 +34,6 @@ pub mod store;
 pub mod texel;
 pub mod text;
 pub mod views;
+pub mod words;
 
 pub use error::{Error, Kind, Result};

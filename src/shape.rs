@@ -3,6 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+/// Longest side of a size that is written as text.
+pub const MOST_SIDE: usize = 1 << 24;
+
 /// Height and width in texels. Written `WIDTHxHEIGHT`, as pictures are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
@@ -45,9 +48,10 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("expected WIDTHxHEIGHT such as 1024x1024, got {text:?}");
+        let expected =
+            || format!("expected WIDTHxHEIGHT such as 1024x1024, each from 1 to {MOST_SIDE}, got {text:?}");
         let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
-        let side = |part: &str| part.trim().parse().ok().filter(|n| (1..=1 << 24).contains(n));
+        let side = |part: &str| part.trim().parse().ok().filter(|n| (1..=MOST_SIDE).contains(n));
         Ok(Self { height: side(height).ok_or_else(expected)?, width: side(width).ok_or_else(expected)? })
     }
 }
@@ -108,21 +112,29 @@ impl Area {
     }
 }
 
+/// A whole number of any length; one that 64 bits do not hold is the largest or the least that they do.
+fn whole_number(text: &str) -> Option<i64> {
+    let text = text.trim();
+    let (digits, beyond) = match text.strip_prefix('-') {
+        Some(digits) => (digits, i64::MIN),
+        None => (text.strip_prefix('+').unwrap_or(text), i64::MAX),
+    };
+    let is_number = !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit());
+    is_number.then(|| text.parse().unwrap_or(beyond))
+}
+
 impl FromStr for Area {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let expected = || format!("expected x,y,width,height such as 0,0,512,512, got {text:?}");
-        let numbers: Vec<i64> = text
-            .split(',')
-            .map(|part| part.trim().parse())
-            .collect::<Result<_, _>>()
-            .map_err(|_| expected())?;
+        let numbers: Vec<i64> =
+            text.split(',').map(whole_number).collect::<Option<_>>().ok_or_else(expected)?;
         let &[x, y, width, height] = numbers.as_slice() else { return Err(expected()) };
         let is_side = |side: i64| (1..=AREA_MOST).contains(&side);
         let is_place = |first: i64, side: i64| first >= -AREA_MOST && first <= AREA_MOST - side;
         if !is_side(width) || !is_side(height) {
-            return Err(expected());
+            return Err(format!("expected a width and a height from 1 to {AREA_MOST}, got {text:?}"));
         }
         if !is_place(x, width) || !is_place(y, height) {
             return Err(format!("expected places from -2^31 to 2^31 - 1, got {text:?}"));
@@ -134,6 +146,23 @@ impl FromStr for Area {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_or_an_area_that_is_too_large_is_told_its_limits() {
+        for text in ["0x5", "16777217x1", "5x99999999999999999999", "-1x5"] {
+            assert!(text.parse::<Size>().is_err_and(|told| told.contains("from 1 to 16777216")), "{text}");
+        }
+        assert!("16777216x1".parse::<Size>().is_ok());
+        for text in ["0,0,0,5", "0,0,5,-1", "0,0,5000000000,1", "0,0,1,99999999999999999999"] {
+            assert!(text.parse::<Area>().is_err_and(|told| told.contains("from 1 to 2147483648")), "{text}");
+        }
+        for text in ["99999999999999999999,0,1,1", "0,-99999999999999999999,1,1", "2147483648,0,1,1"] {
+            assert!(text.parse::<Area>().is_err_and(|told| told.contains("places from -2^31")), "{text}");
+        }
+        for text in ["", "1,2,3", "1,2,3,4,5", "a,0,1,1", "1.5,0,1,1", "-,0,1,1"] {
+            assert!(text.parse::<Area>().is_err_and(|told| told.contains("x,y,width,height")), "{text}");
+        }
+    }
 
     #[test]
     fn the_window_lies_in_the_middle() {

@@ -17,6 +17,8 @@ mod coherent;
 mod coherent_damage;
 #[path = "behaviour/coherent_example.rs"]
 mod coherent_example;
+#[path = "behaviour/command_line.rs"]
+mod command_line;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/damaged_stores.rs"]
@@ -40,6 +42,8 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/many.rs"]
+mod many;
 #[path = "behaviour/odd_archives.rs"]
 mod odd_archives;
 #[path = "behaviour/option_effects.rs"]
@@ -47,6 +51,8 @@ mod odd_archives;
 mod option_effects;
 #[path = "behaviour/paper_bytes.rs"]
 mod paper_bytes;
+#[path = "behaviour/picture_formats.rs"]
+mod picture_formats;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
 #[path = "behaviour/real_data.rs"]
@@ -55,6 +61,8 @@ mod real_data;
 mod recipes;
 #[path = "behaviour/safety.rs"]
 mod safety;
+#[path = "behaviour/setup.rs"]
+mod setup;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

@@ -38,7 +38,7 @@ impl Tiles {
         let size = exemplar.size;
         if !exemplar.wraps {
             return Err(Error::usage("the borders of this tile do not join, so no tiles of its border do")
-                .hint("make a model with a tile that joins, by --tile auto, or choose another --method"));
+                .hint("choose another --method, or make a model whose tile joins: btf model --tile cut, of a measurement large enough"));
         }
         if !(1..=MOST_TILES).contains(&count) {
             return Err(Error::usage(format!("got {count} tiles, expected 1 to {MOST_TILES}")));

@@ -3,19 +3,22 @@ use std::time::Duration;
 
 use btfkit::error::{Error, Result};
 use btfkit::picture::{Ending, Picture, false_color};
-use btfkit::run::Context;
-use btfkit::stage::cluster::{Amount, Step, Stepped};
+use btfkit::run::{Context, progress};
+use btfkit::stage::cluster::{Amount, First, Step, Stepped};
 use btfkit::stage::import::Shard;
 use btfkit::stage::{cluster, compare, image, normals};
-use btfkit::store::measurement::Measurement;
-use btfkit::store::model::Model;
+use btfkit::store::measurement::{self, Measurement};
+use btfkit::store::model::{Model, Stage};
 use btfkit::texel::cluster::centre::CentreRule;
 use btfkit::texel::cluster::lloyd::Limits;
+use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::appearance::{appearance_plan, tell_appearance};
+use super::each::{Ended, Line, each};
 use super::fit::{FitOptions, fit_plan, tell_field};
+use super::outputs::{Naming, Pair};
 use super::table::{row, table};
 use super::tile::{Seed, TileOptions, tell_tile, tile_plan};
 use super::{Tell, bytes_text, number};
@@ -40,7 +43,12 @@ struct ClusterOptions {
     /// Least relative gain of the objective that is worth another pass
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
     tolerance: f64,
-    /// Texels to cluster in memory before all others are passed over [default: as many as 192 MiB hold]
+    /// Where the centres come from that passes over all texels begin with [default: all texels where 192 MiB hold
+    /// them, else sample]
+    #[arg(long, value_enum)]
+    first: Option<FirstName>,
+    /// Texels of the sample, clustered in memory [default: as many as 192 MiB hold; of a mini-batch 16384 or eight a
+    /// cluster]
     #[arg(long, value_name = "TEXELS")]
     sample: Option<usize>,
     /// Draw first centres so many times and go on with the best
@@ -50,7 +58,7 @@ struct ClusterOptions {
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile holds this one
-    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "sample", "restarts", "time"])]
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "first", "sample", "restarts", "time"])]
     clusters_of: Option<PathBuf>,
 }
 
@@ -60,6 +68,14 @@ enum Centre {
     Median,
     /// The textbook's K-means
     Mean,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FirstName {
+    /// A random sample of the texels, as large as memory is set aside for
+    Sample,
+    /// Batches of chunks drawn over the whole store: a sample of the first, then passes over batches that double
+    Minibatch,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -86,12 +102,15 @@ Examples:
   btf model wood.zarr wood.model.zarr
   btf model leather.zarr --clusters 128 --mrf 2d --tile 128x128
   btf model cloth.zarr --lattice '15.2,0;0,18.4'
+  btf model stores/*.zarr --into models            a model each; a bad one does not stop the others
 Stages that are done by the same recipe are not run again.")]
 pub(super) struct Whole {
-    /// The measurement
-    measurement: PathBuf,
-    /// The model to make [default: the measurement's name with .model.zarr]
-    model: Option<PathBuf>,
+    /// The measurement, and the model to make [default: the measurement's name with .model.zarr]; or many measurements
+    #[arg(required = true, value_name = "MEASUREMENT")]
+    paths: Vec<PathBuf>,
+    /// Folder for the models; every name is a measurement [default: beside each]
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
     #[command(flatten)]
     tile: TileOptions,
     #[command(flatten)]
@@ -148,6 +167,10 @@ pub(super) struct Cluster {
 
 /// Estimate the normal map of a model's tile
 #[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf normals wood.zarr wood.model.zarr
+  btf normals wood.zarr wood.model.zarr --robust    leaves out shadowed and highlighted lights")]
 pub(super) struct Normals {
     /// The measurement
     measurement: PathBuf,
@@ -170,14 +193,14 @@ pub(super) struct Compare {
     model: PathBuf,
     /// The measurement
     measurement: PathBuf,
-    /// Also write measured tile, model and their difference (4 times) side by side
+    /// Also write measured tile, model and their difference (4 times) side by side: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Light of the picture: theta,phi in degrees
-    #[arg(long, default_value = "15,0")]
+    #[arg(long, default_value = "15,0", allow_hyphen_values = true)]
     light: Direction,
     /// View of the picture
-    #[arg(long, default_value = "0,0")]
+    #[arg(long, default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
     /// Print the figures as JSON
     #[arg(long)]
@@ -185,27 +208,62 @@ pub(super) struct Compare {
 }
 
 impl Whole {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let model = self.model.clone().unwrap_or_else(|| {
-            let name = self.measurement.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            self.measurement
-                .with_file_name(format!("{}.model.zarr", name.strip_suffix(".zarr").unwrap_or(&name)))
-        });
-        let plan = tile_plan(&self.measurement, &model, &self.tile, self.seed.seed)?;
-        if self.dry_run {
-            return tell.plan(&plan.summary());
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        let naming = Naming { reads: measurement::KIND, ending: None, becomes: ".model.zarr" };
+        let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
+        if let [pair] = pairs.as_slice() {
+            return self.one(pair, context, tell).map(|_| Ended::Done);
         }
-        tell_tile(&plan.run(context)?, tell);
-        tell_clusters(
-            &run_clusters(&self.measurement, &model, &self.cluster, self.seed.seed, context)?,
-            tell,
-        );
-        let plan = normals_plan(&self.measurement, &model, &self.normals)?;
-        tell_normals(&plan.run(context)?, tell);
-        let plan = fit_plan(&model, &self.fit)?;
-        tell_field(&plan.run(context)?, tell);
-        tell_appearance(&appearance_plan(&model, &self.tile.lattice)?.run(context)?, tell);
-        Ok(())
+        let name = |pair: &Pair| pair.input.display().to_string();
+        each(&pairs, name, false, context, tell, |pair| {
+            let clusters = self.one(pair, context, if self.dry_run { tell } else { tell.silent() })?;
+            let clusters = clusters.map(|clusters| counted(clusters, "cluster"));
+            Ok((
+                Line::Text(format!(
+                    "{}: {}",
+                    pair.output.display(),
+                    clusters.unwrap_or("planned".to_owned())
+                )),
+                None,
+            ))
+        })
+    }
+
+    /// Makes one model; tells how many clusters it has, unless nothing but a plan was asked for.
+    fn one(&self, pair: &Pair, context: &Context<'_>, tell: Tell) -> Result<Option<usize>> {
+        let Pair { input: measurement, output: model } = pair;
+        let plan = tile_plan(measurement, model, &self.tile, self.seed.seed)?;
+        if self.dry_run {
+            return tell.plan(&plan.summary()).map(|()| None);
+        }
+        let begin = |stage: Stage| {
+            let number = 1 + Stage::ALL.iter().position(|&other| other == stage).unwrap_or(0);
+            let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
+            context.progress.stage(Some(stage));
+        };
+        // A line may be told only while no bar is drawn.
+        let told = |found: bool, told: &dyn Fn(Tell)| context.progress.pause(&mut || told(tell.found(found)));
+        begin(Stage::Tile);
+        let found = plan.is_done()?;
+        let tile = plan.run(context)?;
+        told(found, &|tell| tell_tile(&tile, tell));
+        begin(Stage::Cluster);
+        let (found, clusters) = run_clusters(measurement, model, &self.cluster, self.seed.seed, context)?;
+        told(found, &|tell| tell_clusters(&clusters, tell));
+        begin(Stage::Normals);
+        let plan = normals_plan(measurement, model, &self.normals)?;
+        let (found, normals) = (plan.is_done()?, plan.run(context)?);
+        told(found, &|tell| tell_normals(&normals, tell));
+        begin(Stage::Fit);
+        let plan = fit_plan(model, &self.fit)?;
+        let (found, field) = (plan.is_done()?, plan.run(context)?);
+        told(found, &|tell| tell_field(&field, tell));
+        begin(Stage::Appearance);
+        let plan = appearance_plan(model, &self.tile.lattice)?;
+        let (found, appearance) = (plan.is_done(), plan.run(context)?);
+        told(found, &|tell| tell_appearance(&appearance, tell));
+        context.progress.stage(None);
+        Ok(Some(clusters.clusters))
     }
 }
 
@@ -219,7 +277,8 @@ impl Cluster {
             };
         }
         let Some(step) = self.step() else {
-            tell_clusters(&run_clusters(measurement, model, options, seed.seed, context)?, tell);
+            let (found, report) = run_clusters(measurement, model, options, seed.seed, context)?;
+            tell_clusters(&report, tell.found(found));
             return Ok(());
         };
         match cluster_plan(measurement, model, options, seed.seed)?.step(step, context)? {
@@ -227,7 +286,7 @@ impl Cluster {
             Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
             Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
             Stepped::Assigned { pass, found, written } => {
-                tell.line(format!("pass {pass}: {written} parts assigned, {found} were done"));
+                tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
         }
         Ok(())
@@ -248,22 +307,29 @@ impl Normals {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        tell_normals(&plan.run(context)?, tell);
+        let found = plan.is_done()?;
+        tell_normals(&plan.run(context)?, tell.found(found));
         Ok(())
     }
 }
 
-/// Clusters, or takes the clusters of another model.
+/// Clusters, or takes the clusters of another model; tells whether that was found done.
 fn run_clusters(
     measurement: &Path,
     model: &Path,
     options: &ClusterOptions,
     seed: u64,
     context: &Context<'_>,
-) -> Result<cluster::Report> {
+) -> Result<(bool, cluster::Report)> {
     match &options.clusters_of {
-        Some(from) => taken_plan(model, from)?.run(context),
-        None => cluster_plan(measurement, model, options, seed)?.run(context),
+        Some(from) => {
+            let plan = taken_plan(model, from)?;
+            Ok((plan.is_done()?, plan.run(context)?))
+        }
+        None => {
+            let plan = cluster_plan(measurement, model, options, seed)?;
+            Ok((plan.is_done()?, plan.run(context)?))
+        }
     }
 }
 
@@ -293,6 +359,10 @@ fn cluster_plan(
         amount,
         centre,
         limits,
+        first: options.first.map(|first| match first {
+            FirstName::Sample => First::Sample,
+            FirstName::Minibatch => First::Minibatch,
+        }),
         sample: options.sample,
         restarts: options.restarts,
         seed,
@@ -311,18 +381,26 @@ fn normals_plan(measurement: &Path, model: &Path, options: &NormalsOptions) -> R
 fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
-    let how = taken.map_or(format!("after {} passes", report.passes.len()), |(name, texels)| {
-        format!("of {name}, where {texels} texels were clustered")
-    });
+    let passes = match (report.batches.len(), report.passes.len()) {
+        (0, all) => format!("after {}", counted(all, "pass")),
+        (batches, all) => {
+            format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
+        }
+    };
+    let how = taken
+        .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
+    tell.stage(
+        "clusters",
+        &format!(
+            "{} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
+            report.clusters, report.representative_lightness_error
+        ),
+    );
     tell.line(format!(
-        "clusters  {} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
-        report.clusters, report.representative_lightness_error
-    ));
-    tell.line(format!(
-        "          representatives {:.3} from their centres, at most {:.3}; {} clusters of one texel",
+        "          representatives {:.3} from their centres, at most {:.3}; {} of one texel",
         report.representative_from_centre,
         report.representative_from_centre_most,
-        report.single_texel_clusters
+        counted(report.single_texel_clusters, "cluster")
     ));
     let stored = report.representative_bytes + report.index_bytes;
     let ratio = |bytes: u64| bytes as f64 / stored as f64;
@@ -337,15 +415,19 @@ fn tell_clusters(report: &cluster::Report, tell: Tell) {
 
 fn tell_normals(report: &normals::Report, tell: Tell) {
     let [x, y, z] = report.mean;
-    tell.line(format!(
-        "normals   by {} lights of view {}; mean ({x:.3}, {y:.3}, {z:.3}), spread {:.1} degrees",
-        report.lights, report.view, report.spread_deg
-    ));
+    let lights = counted(report.lights, "light");
+    tell.stage(
+        "normals",
+        &format!(
+            "by {lights} of view {}; mean ({x:.3}, {y:.3}, {z:.3}), spread {:.1} degrees",
+            report.view, report.spread_deg
+        ),
+    );
 }
 
 impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        self.picture.as_deref().map(Ending::of).transpose()?;
+        self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let report = compare::run(&options, context)?;
         if self.json {
@@ -363,12 +445,13 @@ impl Compare {
                 ]);
             }
             tell.text(&table(&rows));
-            tell.line(format!("CIEDE2000 over {} texels, the other figures over all", report.colour_texels));
+            tell.line(format!(
+                "CIEDE2000 over {}, the other figures over all",
+                counted(report.colour_texels, "texel")
+            ));
             if report.all.samples_left_out > 0 {
-                let count = report.all.samples_left_out;
-                tell.line(format!(
-                    "{count} samples are not finite: PSNR leaves them out, elsewhere they count as 0"
-                ));
+                let count = counted(report.all.samples_left_out, "sample");
+                tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
         match &self.picture {

@@ -5,6 +5,7 @@ use btfkit::lattice::{LatticeChoice, WaveCounts};
 use btfkit::run::Context;
 use btfkit::stage::appearance;
 use btfkit::store::appearance::AppearanceReport;
+use btfkit::words::counted;
 use clap::Args;
 
 use super::Tell;
@@ -35,7 +36,8 @@ impl Appearance {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        tell_appearance(&plan.run(context)?, tell);
+        let found = plan.is_done();
+        tell_appearance(&plan.run(context)?, tell.found(found));
         Ok(())
     }
 }
@@ -47,10 +49,8 @@ pub(super) fn appearance_plan(model: &Path, lattice: &LatticeChoice) -> Result<a
 pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
     let [_, _, height, width] = report.exemplar;
     let coarsest = report.levels.last().map_or(1, |level| level.spacing);
-    tell.line(format!(
-        "exemplar  {width}x{height}, described at {} levels from 1 to {coarsest} texels apart",
-        report.levels.len()
-    ));
+    let levels = counted(report.levels.len(), "level");
+    tell.stage("exemplar", &format!("{width}x{height}, described at {levels}, 1 to {coarsest} texels apart"));
     let counts = WaveCounts(report.lattice.clone());
     let cells = counts.cells();
     tell.line(match (report.found.as_str(), report.lattice.len()) {

@@ -5,14 +5,15 @@ use btfkit::error::{Error, Result};
 use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::stage::check::finding::MOST_ALARM;
-use btfkit::stage::check::{self, Finding, Report, State};
+use btfkit::stage::check::{self, Finding, Report, State, Statistics};
 use btfkit::stage::import;
 use btfkit::store::measurement::Measurement;
 use clap::Args;
 
-use super::Tell;
+use super::each::{Ended, Line, Outcome, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
+use super::{Tell, as_json};
 
 /// Examine a measurement: swapped or mirrored directions, wrong curves, images black, double or misplaced
 #[derive(Args)]
@@ -21,14 +22,18 @@ Examples:
   btf check wood.zarr
   btf check UBO_WOOD256.zip --picture wood.png
   btf check felt.btf --azimuth mirrored             does that repair it?
+  btf check archives/*                              a line each, and a count
 Exits with 65 if there is a fault. docs/check.md explains every check.")]
 pub(super) struct Check {
-    /// A measurement, or an archive (in pieces perhaps)
+    /// Measurements and archives; of several each has a line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
+    /// The archives are pieces of one measurement
+    #[arg(long)]
+    pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
-    /// Write a sheet of what was measured, .png
+    /// Write a sheet of what was measured: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Tell all as JSON
@@ -37,20 +42,19 @@ pub(super) struct Check {
 }
 
 impl Check {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        self.picture.as_deref().map(Ending::of).transpose()?;
-        let path = self.paths.first().map_or(Path::new(""), PathBuf::as_path);
-        let (statistics, report) =
-            if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
-                check::run(&open(path)?, context)?
-            } else {
-                let source = self.source.open(&self.paths)?;
-                let description = import::describe(source.as_ref(), 1.0);
-                check::run(&ArchiveViews::new(source.as_ref(), description), context)?
-            };
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
+        if self.paths.len() > 1 && !self.pieces {
+            if self.picture.is_some() {
+                return Err(Error::usage(format!("got --picture for {} inputs", self.paths.len()))
+                    .hint("check one at a time for a sheet, or say --pieces if they are one measurement"));
+            }
+            let name = |path: &PathBuf| path.display().to_string();
+            return each(&self.paths, name, self.json, context, tell, |path| self.one_of_many(path, context));
+        }
+        let (statistics, report) = self.report(&self.paths, context)?;
         if self.json {
-            let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            tell.plan(&as_json(&report)?)?;
         } else {
             tell_report(&report, tell);
         }
@@ -58,13 +62,44 @@ impl Check {
             let findings: Vec<&Finding> = report.findings().collect();
             check::picture::sheet(&statistics, &findings).write(path, context.existing)?;
         }
-        let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
-        if faults.is_empty() {
-            return Ok(());
-        }
-        Err(Error::input(format!("{}: {}", path.display(), faults.join(", ")))
-            .hint("docs/check.md tells how each is recognised and what to do"))
+        faults(first(&self.paths), &report).map_or(Ok(Ended::Done), Err)
     }
+
+    /// Examines one input, which may lie in pieces.
+    fn report(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<(Statistics, Report)> {
+        let path = first(paths);
+        if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
+            return check::run(&open(path)?, context);
+        }
+        let source = self.source.open(paths)?;
+        let description = import::describe(source.as_ref(), 1.0);
+        check::run(&ArchiveViews::new(source.as_ref(), description), context)
+    }
+
+    fn one_of_many(&self, path: &PathBuf, context: &Context<'_>) -> Result<Outcome> {
+        let (_, report) = self.report(std::slice::from_ref(path), context)?;
+        let suspected: Vec<&str> = report.findings().map(|finding| finding.code).collect();
+        let line = if self.json {
+            Line::Json(as_json(&report)?)
+        } else if suspected.is_empty() {
+            Line::Text("nothing found".to_owned())
+        } else {
+            Line::Text(format!("no fault; noted: {}", suspected.join(", ")))
+        };
+        Ok((line, faults(path, &report)))
+    }
+}
+
+fn first(paths: &[PathBuf]) -> &Path {
+    paths.first().map_or(Path::new(""), PathBuf::as_path)
+}
+
+/// The error that tells the faults of an input, where it has any.
+fn faults(path: &Path, report: &Report) -> Option<Error> {
+    let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
+    let error =
+        (!faults.is_empty()).then(|| Error::input(format!("{}: {}", path.display(), faults.join(", "))))?;
+    Some(error.hint("docs/check.md tells how each is recognised and what to do"))
 }
 
 /// A measurement that is complete.
@@ -79,7 +114,7 @@ fn open(path: &Path) -> Result<Measurement> {
 }
 
 fn tell_report(report: &Report, tell: Tell) {
-    let mut rows = vec![row!["check", "result", "of alarm"]];
+    let mut rows = vec![row!["check", "result", "of alarm", ""]];
     for check in &report.checks {
         let state = match check.state {
             State::Ok => "ok",
@@ -90,13 +125,9 @@ fn tell_report(report: &Report, tell: Tell) {
             let more = if alarm >= MOST_ALARM { ">" } else { "" };
             format!("{more}{:.0} %", 100.0 * alarm)
         });
-        rows.push(row![check.name, state, alarm]);
+        rows.push(row![check.name, state, alarm, check.detail]);
     }
-    // The reasons follow the table as they are: a column for them would be as wide as the longest.
-    for (line, check) in table(&rows).lines().zip(std::iter::once(None).chain(report.checks.iter().map(Some)))
-    {
-        tell.line(format!("{line}  {}", check.map_or("", |check| &check.detail)).trim_end().to_owned());
-    }
+    tell.text(&table(&rows));
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
         tell.line("");

@@ -26,7 +26,7 @@ pub(super) struct Curve {
     measurement: PathBuf,
     /// The model with the tile
     model: PathBuf,
-    /// Also draw a chart, .png
+    /// Also draw a chart: .png, .jpg, .webp or .tif
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the curve as JSON
@@ -42,7 +42,7 @@ pub(super) struct Curve {
 
 impl Curve {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        self.out.as_deref().map(Ending::of).transpose()?;
+        self.out.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let plan = curve::plan(&curve::Options {
             measurement: self.measurement.clone(),
             model: self.model.clone(),

@@ -4,6 +4,7 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::stage::deepzoom::{self, Encoding};
 use btfkit::stage::image::Subject;
+use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::Tell;
@@ -84,10 +85,10 @@ impl Deepzoom {
         }
         let [width, height] = report.size;
         tell.line(format!(
-            "{}: {width}x{height} in {} levels; {} tiles written, {} found done",
+            "{}: {width}x{height} in {}; {} written, {} found done",
             output.display(),
-            report.levels,
-            report.tiles_written,
+            counted(report.levels, "level"),
+            counted(report.tiles_written, "tile"),
             report.tiles_found
         ));
         tell.line(format!("{}: a viewer of it", output.with_extension("html").display()));

@@ -6,17 +6,17 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::enlarge::patches::Pieces;
-use btfkit::stage::enlarge::{self, By, Verdict, coherent, paper, patches, quilt};
+use btfkit::stage::enlarge::{self, By, Report, Verdict, coherent, paper, patches, quilt};
 use btfkit::stage::import::Shard;
+use btfkit::store::model;
 use clap::{Args, ValueEnum};
 
+use super::each::{Ended, Line, each};
+use super::outputs::{Naming, Pair};
 use super::{Tell, bytes_text, number};
 
 /// Tiles of a set, unless their number is given.
 const TILES: usize = 4;
-
-/// Nearest normals among which the paper's method chooses, unless their number is given.
-const CANDIDATES: usize = 16;
 
 /// The most outputs that one command makes.
 const MOST_SEEDS: u64 = 1 << 16;
@@ -33,22 +33,26 @@ Examples:
   btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of Filip and Haindl 2007
   btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    their second baseline
   btf enlarge wood.model.zarr quilt.zarr --size 1024x1024 --method quilt image quilting
+  btf enlarge models/*.model.zarr --into planes --size 2048x2048         many models, wood.enlarged.zarr and so on
 The same model, method, size and seed give the same bytes, whatever the memory, the threads, the shards and the
 interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
-    /// The model
-    model: PathBuf,
-    /// The enlarged index to make; with several seeds each has its number in its name
-    output: PathBuf,
-    /// Size of the output in texels, WIDTHxHEIGHT
-    #[arg(long)]
+    /// The model, and the enlarged index to make [default: the model's name with .enlarged.zarr]; or many models. With
+    /// several seeds each output has its number in its name
+    #[arg(required = true, value_name = "MODEL")]
+    paths: Vec<PathBuf>,
+    /// Folder for the outputs; every name is a model [default: beside each]
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    /// Size of the output in texels, WIDTHxHEIGHT, each from 1 to 16777216
+    #[arg(long, allow_hyphen_values = true)]
     size: Size,
     /// How to enlarge
     #[arg(long, value_enum, default_value = "coherent")]
     method: Method,
     /// Seed of all that is drawn at random: another seed gives another piece of the same material. FIRST..LAST makes
     /// one output for each, the last included
-    #[arg(long, default_value = "1", value_parser = seeds)]
+    #[arg(long, default_value = "1", value_parser = seeds, allow_hyphen_values = true)]
     seed: RangeInclusive<u64>,
     /// Make an output that joins at its own borders (paper: nearly). Its sides must be multiples of a power of two
     /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); sizes that are not are
@@ -71,7 +75,7 @@ pub(super) struct Enlarge {
     /// Number of tiles that join each other (tiles) [default: 4]
     #[arg(long, value_name = "N")]
     tiles: Option<usize>,
-    /// Number of nearest normals among which one is chosen (paper) [default: 16]
+    /// Number of nearest normals among which one is chosen (paper) [default: 16, or all of a smaller tile]
     #[arg(long)]
     candidates: Option<usize>,
     /// Rows in work at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
@@ -99,11 +103,32 @@ enum Method {
 }
 
 impl Enlarge {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
         self.refuse_options_of_others()?;
+        let naming = Naming { reads: model::KIND, ending: Some(".model.zarr"), becomes: ".enlarged.zarr" };
+        let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
+        if let [pair] = pairs.as_slice() {
+            tell_reports(&self.one(pair, context, tell)?, self.size, tell);
+            return Ok(Ended::Done);
+        }
+        let name = |pair: &Pair| pair.input.display().to_string();
+        each(&pairs, name, false, context, tell, |pair| {
+            let reports = self.one(pair, context, tell)?;
+            let mut told = Vec::new();
+            for report in &reports {
+                told.push(in_short(report, self.size));
+                let warnings = report.verdict.iter().flat_map(|verdict| &verdict.warnings);
+                told.extend(warnings.map(|warning| format!("warning: {warning}")));
+            }
+            Ok((Line::Text(if told.is_empty() { "planned".to_owned() } else { told.join("; ") }), None))
+        })
+    }
+
+    /// Makes the outputs of one model; none where only the plan was asked for.
+    fn one(&self, pair: &Pair, context: &Context<'_>, tell: Tell) -> Result<Vec<Report>> {
         let plan = enlarge::plan(&enlarge::Options {
-            model: self.model.clone(),
-            output: self.output.clone(),
+            model: pair.input.clone(),
+            output: pair.output.clone(),
             size: self.size,
             seeds: self.seed.clone(),
             tileable: self.tileable,
@@ -111,29 +136,10 @@ impl Enlarge {
             shard: self.shard,
         })?;
         if self.dry_run {
-            return tell.plan(&plan.summary(context));
+            tell.plan(&plan.summary(context))?;
+            return Ok(Vec::new());
         }
-        for report in plan.run(context)? {
-            tell.line(format!(
-                "{}: {} from seed {}; {}: {} written, {} found done",
-                report.output.display(),
-                self.size,
-                report.seed,
-                report.unit,
-                report.written,
-                report.found
-            ));
-            tell.line(format!(
-                "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
-                bytes_text(report.stored_bytes),
-                report.raw_bytes as f64 / report.stored_bytes as f64,
-                bytes_text(report.raw_bytes)
-            ));
-            if let Some(verdict) = &report.verdict {
-                tell_verdict(verdict, tell);
-            }
-        }
-        Ok(())
+        plan.run(context)
     }
 
     /// Refuses options that the method does not take.
@@ -163,7 +169,7 @@ impl Enlarge {
         let pieces = |pieces| By::Patches(patches::Options { pieces, keep_source, keep_normals });
         match self.method {
             Method::Paper => By::Paper(paper::Options {
-                candidates: self.candidates.unwrap_or(CANDIDATES),
+                candidates: self.candidates,
                 keep_normals,
                 band_rows: self.band.map(|rows| rows as usize),
             }),
@@ -178,6 +184,33 @@ impl Enlarge {
             Method::Quilt => By::Quilt(quilt::Options { keep_source, keep_normals }),
         }
     }
+}
+
+fn tell_reports(reports: &[Report], size: Size, tell: Tell) {
+    for report in reports {
+        tell.line(in_short(report, size));
+        tell.line(format!(
+            "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
+            bytes_text(report.stored_bytes),
+            report.raw_bytes as f64 / report.stored_bytes as f64,
+            bytes_text(report.raw_bytes)
+        ));
+        if let Some(verdict) = &report.verdict {
+            tell_verdict(verdict, tell);
+        }
+    }
+}
+
+/// What was made, in a line.
+fn in_short(report: &Report, size: Size) -> String {
+    format!(
+        "{}: {size} from seed {}; {}: {} written, {} found done",
+        report.output.display(),
+        report.seed,
+        report.unit,
+        report.written,
+        report.found
+    )
 }
 
 /// One line on whether an enlargement looks like its tile, and one for each warning.

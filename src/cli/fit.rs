@@ -88,7 +88,8 @@ impl Fit {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        tell_field(&plan.run(context)?, tell);
+        let found = plan.is_done()?;
+        tell_field(&plan.run(context)?, tell.found(found));
         let Some(name) = &self.report else { return Ok(()) };
         let comparison = fit::compare(&self.model, context)?;
         let text = figures_text(&comparison.figures());
@@ -134,7 +135,7 @@ pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
             format!("{width}x{height} eta {} radius {:.3} gain {:.2}", level.eta, level.radius, level.gain)
         })
         .collect();
-    tell.line(format!("field     {}; {}", report.mrf, levels.join(", ")));
+    tell.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
     tell.line(format!("          error of its autocovariance {:.3}", report.autocovariance_error));
     for (number, level) in report.levels.iter().enumerate() {
         if let Some(note) = &level.note {

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use btfkit::error::Result;
+use btfkit::picture::{Bits, Encoding, Ending};
 use btfkit::run::Context;
 use btfkit::stage::image;
 use clap::{Args, ValueEnum};
@@ -16,6 +17,7 @@ Examples:
   btf image wood-4k.zarr --light 60,90 --window 0,0,1024,1024 --out corner.exr
   btf image wood-4k.zarr --values measured --out measured-4k.png        values of the measurement, not of clusters
   btf image wood.model.zarr --what normals --out normals.png
+  btf image wood.zarr --out wood.jpg --quality 95
   btf image --plane wood.model.zarr --window -500,12345,512,512 --out piece.png
                                                                         a part of an endless plane that is not stored
 A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
@@ -23,14 +25,29 @@ from the three views and three lights around them.")]
 pub(super) struct Image {
     /// A measurement, a model or an enlarged index
     source: PathBuf,
-    /// The picture: .png for displays, .exr for linear values
+    /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has at
+    /// most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory
     #[arg(long, short)]
     out: PathBuf,
+    /// Bits of a display value: 16 for PNG and TIFF
+    #[arg(long, value_enum, default_value = "8")]
+    bits: BitsName,
+    /// Quality of a JPEG [default: 90]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
+    quality: Option<u8>,
     /// What to show
     #[arg(long, value_enum, default_value = "appearance")]
     what: What,
     #[command(flatten)]
     scene: SceneArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BitsName {
+    #[value(name = "8")]
+    Eight,
+    #[value(name = "16")]
+    Sixteen,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -51,7 +68,12 @@ impl Image {
             What::Normals => image::Subject::Normals,
         };
         let options = self.scene.options(&self.source, subject);
-        let (size, made) = image::run(&options, self.scene.exposure, &self.out, context)?;
+        let bits = match self.bits {
+            BitsName::Eight => Bits::Eight,
+            BitsName::Sixteen => Bits::Sixteen,
+        };
+        let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(Some(bits), self.quality)?;
+        let (size, made) = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
         tell.line(format!("{}: {size}{}", self.out.display(), found(made)));
         Ok(())
     }

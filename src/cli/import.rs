@@ -6,10 +6,11 @@ use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
 use btfkit::store::codec::Chain;
 use btfkit::store::measurement::Description;
+use btfkit::words::counted;
 use clap::Args;
 
+use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
-use super::table::{row, table};
 use super::{Tell, bytes_text, number};
 
 /// Archive to measurement: any of the formats that `btf info` knows, one archive or hundreds
@@ -53,18 +54,13 @@ struct Job {
 }
 
 impl Import {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
         let jobs = self.jobs()?;
-        if let [job] = jobs.as_slice() {
-            return match self.import(job, context, tell)? {
-                Some((description, report)) => {
-                    tell.line(told(&job.store, &description, &report));
-                    Ok(())
-                }
-                None => Ok(()),
-            };
+        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, tell) };
+        if let Some((description, report)) = self.import(job, context, tell)? {
+            tell.line(format!("{}: {}", job.store.display(), told(&description, &report)));
         }
-        self.import_all(&jobs, context, tell)
+        Ok(Ended::Done)
     }
 
     fn jobs(&self) -> Result<Vec<Job>> {
@@ -73,7 +69,7 @@ impl Import {
         let folder = self.into.clone().unwrap_or_default();
         // Misspelt, the last of many archives is not to become a store.
         if let Some(absent) =
-            self.paths.iter().find(|path| !path.exists() && !(self.into.is_none() && is_store(path)))
+            self.paths.iter().find(|path| !(path.exists() || self.into.is_none() && is_store(path)))
         {
             let error = Error::missing(format!("{}: no such archive", absent.display()));
             return Err(
@@ -127,7 +123,7 @@ impl Import {
     }
 
     /// Imports many archives under one bar; those that fail do not stop the others.
-    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<()> {
+    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<Ended> {
         // Counted before anything is imported: opening an archive is cheap.
         let images = |job: &Job| {
             let contents = self.source.open(&job.pieces).map(|source| {
@@ -141,59 +137,27 @@ impl Import {
         let overall = Overall { bar: context.progress };
         let inner = Context::new(&overall, context.stop, context.threads, context.memory_bytes)?
             .with_existing(context.existing);
-        let mut rows = vec![row!["archive", "store", "views x lights", "size", "raw", "result"]];
-        let mut worst: Option<Error> = None;
-        for job in jobs {
-            let archive = job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
-            context.progress.remark(&archive);
+        let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
+        each(jobs, name, false, context, tell, |job| {
+            context.progress.remark(&name(job));
+            let report = self.import(job, &inner, tell)?;
+            let told = report.map(|(description, report)| told(&description, &report));
             let store = job.store.display();
-            match self.import(job, &inner, tell) {
-                Ok(Some((d, report))) => rows.push(row![
-                    archive,
-                    store,
-                    format!("{} x {}", d.views.len(), d.lights.len()),
-                    format!("{} {}", d.size, d.sample_type.name()),
-                    bytes_text(d.bytes()),
-                    format!("{} views written, {} found done", report.views_written, report.views_found)
-                ]),
-                Ok(None) => {}
-                Err(error) if error.kind() == Kind::Stopped => return Err(error),
-                Err(error) => {
-                    rows.push(row![
-                        archive,
-                        store,
-                        "",
-                        "",
-                        "",
-                        format!("failed: {}", first_line(&error.to_string()))
-                    ]);
-                    worst.get_or_insert(error);
-                }
-            }
-        }
-        context.progress.end();
-        let failed = rows.iter().filter(|row| row[5].starts_with("failed")).count();
-        tell.text(&table(&rows));
-        match worst {
-            Some(error) => {
-                Err(error.context(format!("{failed} of {} archives failed, the first of them", jobs.len())))
-            }
-            None => Ok(()),
-        }
+            Ok((Line::Text(told.map_or(format!("{store}"), |told| format!("{store}: {told}"))), None))
+        })
     }
 }
 
-fn told(store: &Path, description: &Description, report: &Report) -> String {
+fn told(description: &Description, report: &Report) -> String {
     let mut text = format!(
-        "{}: {} views x {} lights of {}, {} raw; {} views written, {} found done, {} samples clipped at white",
-        store.display(),
-        description.views.len(),
-        description.lights.len(),
+        "{} x {} of {}, {} raw; {} written, {} found done, {} clipped at white",
+        counted(description.views.len(), "view"),
+        counted(description.lights.len(), "light"),
         description.size,
         bytes_text(description.bytes()),
-        report.views_written,
+        counted(report.views_written, "view"),
         report.views_found,
-        report.samples.clipped
+        counted(report.samples.clipped, "sample")
     );
     for (count, what) in [(report.samples.not_finite, "not finite"), (report.samples.negative, "negative")] {
         if count > 0 {
@@ -201,10 +165,6 @@ fn told(store: &Path, description: &Description, report: &Report) -> String {
         }
     }
     text
-}
-
-fn first_line(text: &str) -> &str {
-    text.lines().next().unwrap_or_default()
 }
 
 /// The progress of one archive as a part of the whole.
@@ -224,6 +184,10 @@ impl Progress for Overall<'_> {
     }
 
     fn end(&self) {}
+
+    fn pause(&self, act: &mut dyn FnMut()) {
+        self.bar.pause(act);
+    }
 
     fn notice(&self, text: &str) {
         self.bar.notice(text);

@@ -1,17 +1,20 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Samples};
 use btfkit::stage::{estimate, import};
 use btfkit::store::codec::Chain;
+use btfkit::store::model::Stage;
+use btfkit::words::counted;
 use clap::Args;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, bytes_text};
+use super::{Tell, as_json, bytes_text};
 
 /// Tell what an archive or a store holds, how far it is, and how large the store of an archive will be
 #[derive(Args)]
@@ -24,11 +27,15 @@ Examples:
   btf info UBO_WOOD256.zip
   btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
   btf info wood.zarr
-  btf info wood.model.zarr --json")]
+  btf info wood.model.zarr --json
+  btf info archives/*                               a line each, and a count")]
 pub(super) struct Info {
-    /// An archive, in pieces perhaps, or a store
+    /// Archives and stores; of several each has a line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
+    /// The archives are pieces of one measurement
+    #[arg(long)]
+    pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
     /// Tell it as JSON
@@ -61,14 +68,23 @@ enum Told {
 type Rows = Vec<Vec<String>>;
 
 impl Info {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        if self.paths.len() > 1 && !self.pieces {
+            let name = |path: &PathBuf| path.display().to_string();
+            return each(&self.paths, name, self.json, context, tell, |path| {
+                let told = self.look(std::slice::from_ref(path), context)?;
+                let line =
+                    if self.json { Line::Json(as_json(&told)?) } else { Line::Text(in_short(&rows(&told))) };
+                Ok((line, None))
+            });
+        }
         let told = self.look(&self.paths, context)?;
         if self.json {
-            let told = serde_json::to_value(&told).map_err(|error| Error::internal(error.to_string()))?;
-            return tell.plan(&told);
+            tell.plan(&as_json(&told)?)?;
+        } else {
+            tell.text(&table(&rows(&told)));
         }
-        tell.text(&table(&rows(&told)));
-        Ok(())
+        Ok(Ended::Done)
     }
 
     /// Looks at one store, or at one archive in pieces perhaps.
@@ -92,6 +108,24 @@ impl Info {
             assumptions: contents.assumptions.clone(),
         })))
     }
+}
+
+/// What tells an input apart from others, of what is told of it.
+fn in_short(rows: &[Vec<String>]) -> String {
+    const TOLD: [&str; 7] = ["views", "lights", "clusters", "views done", "method", "seed", "shards done"];
+    let told = rows.iter().filter_map(|row| match row.as_slice() {
+        [name, value] if name == "kind" || name == "size" => Some(value.clone()),
+        // How far a model's stages are.
+        [name, value] if Stage::ALL.iter().any(|stage| stage.name() == name) => {
+            Some(format!("{name} {value}"))
+        }
+        [name, value] if TOLD.contains(&name.as_str()) => {
+            let value = value.split_once(',').map_or(value.as_str(), |(first, _)| first);
+            Some(format!("{name} {value}"))
+        }
+        _ => None,
+    });
+    told.collect::<Vec<_>>().join(", ")
 }
 
 fn rows(told: &Told) -> Rows {
@@ -204,12 +238,13 @@ fn of_model(about: &Modelled) -> Rows {
                 rows.extend(report.taken_from.iter().map(|(name, _)| row!["  taken from", name]));
                 for (number, pass) in report.passes.iter().enumerate() {
                     let found = format!(
-                        "mean weighted |dL*| {:.4}, {} texels moved",
-                        pass.mean_lightness_error, pass.moved
+                        "mean weighted |dL*| {:.4}, {} moved",
+                        pass.mean_lightness_error,
+                        counted(pass.moved, "texel")
                     );
                     rows.push(row![format!("  pass {}", number + 1), found]);
                 }
-                for name in ["amount", "centre", "sample", "restarts"] {
+                for name in ["amount", "centre", "first", "sample", "restarts"] {
                     rows.extend(asked("cluster", name).map(|value| row![format!("  {name}"), value]));
                 }
                 rows.push(row!["  representatives", bytes_text(report.representative_bytes)]);
@@ -222,7 +257,10 @@ fn of_model(about: &Modelled) -> Rows {
             }
             "fit" => {
                 let Some(report) = &about.field else { continue };
-                rows.push(row!["  field", format!("{}, {} levels", report.mrf, report.levels.len())]);
+                rows.push(row![
+                    "  field",
+                    format!("{}, {}", report.mrf, counted(report.levels.len(), "level"))
+                ]);
                 for name in ["field", "gains", "marginals"] {
                     rows.extend(asked("fit", name).map(|value| row![format!("  {name} of"), value]));
                 }

@@ -8,6 +8,7 @@ use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
 use btfkit::store::output::write_new;
 use btfkit::text::escaped;
+use btfkit::words::counted;
 use clap::Args;
 
 use super::Tell;
@@ -31,11 +32,11 @@ pub(super) struct Judge {
     /// The model of an enlarged index [default: beside it, under the name it had]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT
-    #[arg(long)]
+    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
+    #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
     /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the directions]
-    #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair)]
+    #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]
     #[arg(long, value_name = "N")]
@@ -43,15 +44,15 @@ pub(super) struct Judge {
     /// Write all figures to a JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the pictures that were judged, side by side
-    #[arg(long, value_name = "FILE.png")]
+    /// Write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
+    #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
 }
 
 impl Judge {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         if let Some(path) = &self.sheet {
-            Ending::of(path)?;
+            Ending::of(path, &Ending::DISPLAY)?;
         }
         let (report, sheet) = judge::run(
             &judge::Options {
@@ -85,13 +86,13 @@ fn told(report: &Report) -> String {
     };
     let mut lines = vec![
         format!(
-            "{}: {}, {} crops of {} texels",
+            "{}: {}, {} of {} texels a side",
             escaped(&report.subject.display().to_string()),
             Size::new(height, width),
-            report.crops.len(),
+            counted(report.crops.len(), "crop"),
             report.crop
         ),
-        format!("by {} real crops: {origin}", report.real_crops.len()),
+        format!("by {}: {origin}", counted(report.real_crops.len(), "real crop")),
         String::new(),
     ];
     let mut head = vec![String::new()];

@@ -2,23 +2,28 @@
 
 mod analyse;
 mod appearance;
+mod bytes;
 mod check;
 mod curve;
 mod deepzoom;
 mod demo;
+mod each;
 mod enlarge;
 mod export;
 mod fit;
+mod help;
 mod image;
 mod import;
 mod info;
 mod judge;
 mod number;
+mod outputs;
 mod progress;
 mod sample;
 mod scene;
 mod source;
 mod table;
+mod terminal;
 mod tile;
 mod verify;
 
@@ -34,7 +39,9 @@ use btfkit::run::budget::{address_space_left, cannot_start};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::store::output::{Existing, Made};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use bytes::bytes_text;
+use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};
+use each::Ended;
 use serde_json::Value;
 
 const EXAMPLES: &str = "\
@@ -44,16 +51,19 @@ Examples:
   btf model wood.zarr wood.model.zarr           measurement to model: tile, clusters, normals, random field
   btf enlarge wood.model.zarr big.zarr --size 4096x4096
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
+Each command explains itself: btf import --help, or man btf-import (see btf man --help).
 
 Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input not there yet,
 74 input/output, 75 stopped early (run the same command again).";
 
+/// The version, and the commit that the program was built from.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"), ")");
 /// More threads than any machine has cores that share a memory.
 const MOST_THREADS: i64 = 1024;
 
 /// Turns a measured Bidirectional Texture Function into a small model that covers any surface.
 #[derive(Parser)]
-#[command(name = "btf", version, after_help = EXAMPLES)]
+#[command(name = "btf", version = VERSION, after_help = EXAMPLES, subcommand_help_heading = "Commands")]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -62,12 +72,14 @@ struct Cli {
 }
 
 #[derive(Args)]
+#[command(next_help_heading = "Common options")]
 struct Common {
     /// Threads to use, from 1 to 1024 [default: all cores]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
     threads: Option<u32>,
-    /// Memory to use, such as 512MiB or 2GiB
-    #[arg(long, global = true, default_value = "2GiB", value_parser = parse_bytes, value_name = "SIZE")]
+    /// Memory to use, such as 512MiB, 1.5GiB or 2GB
+    #[arg(long, global = true, default_value = "2GiB", value_parser = bytes::parse_bytes, value_name = "SIZE")]
+    #[arg(allow_hyphen_values = true)]
     memory: u64,
     /// How to tell progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
@@ -85,7 +97,7 @@ struct Common {
 enum ProgressStyle {
     /// Bars on a terminal, nothing elsewhere.
     Auto,
-    /// A JSON object a line on standard error, for schedulers.
+    /// A JSON object a line on standard error, for schedulers; errors too.
     Json,
     /// Nothing.
     None,
@@ -111,11 +123,14 @@ enum Command {
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
     Judge(judge::Judge),
+    Completions(help::Completions),
+    Man(help::Manual),
 }
 
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let matches = help::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let threads = cli.common.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,
@@ -140,6 +155,8 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
+    let tell =
+        Tell { quiet: cli.common.quiet, found: false, json: cli.common.progress == ProgressStyle::Json };
     let memory = cli.common.memory.min(address_space_left().unwrap_or(u64::MAX));
     // zarrs decodes chunks on the global pool.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
@@ -150,14 +167,13 @@ pub(crate) fn run() -> ExitCode {
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
         .inspect(|context| obey_while_computing(&stop, context.computing()))
-        .and_then(|context| cli.command.run(&context, Tell { quiet: cli.common.quiet }));
+        .and_then(|context| cli.command.run(&context, tell));
     progress.end();
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Ended::Done) => ExitCode::SUCCESS,
+        Ok(Ended::Failed(kind)) => ExitCode::from(exit_code(kind)),
         Err(error) => {
-            let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
-            let told = format!("btf: {error}{hint}");
-            let _ = writeln!(std::io::stderr(), "{}", escaped_lines(&told));
+            tell.failure(None, &error);
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -184,16 +200,17 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>) {
 }
 
 impl Command {
-    fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        match self {
+    fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        let single = match self {
+            Self::Info(command) => return command.run(context, tell),
+            Self::Check(command) => return command.run(context, tell),
+            Self::Import(command) => return command.run(context, tell),
+            Self::Verify(command) => return command.run(context, tell),
+            Self::Model(command) => return command.run(context, tell),
+            Self::Enlarge(command) => return command.run(context, tell),
             Self::Demo(command) => command.run(context, tell),
             Self::Sample(command) => command.run(context, tell),
-            Self::Info(command) => command.run(context, tell),
-            Self::Check(command) => command.run(context, tell),
-            Self::Import(command) => command.run(context, tell),
-            Self::Verify(command) => command.run(context, tell),
             Self::Export(command) => command.run(context, tell),
-            Self::Model(command) => command.run(context, tell),
             Self::Tile(command) => command.run(context, tell),
             Self::Cluster(command) => command.run(context, tell),
             Self::Curve(command) => command.run(context, tell),
@@ -201,10 +218,12 @@ impl Command {
             Self::Fit(command) => command.run(context, tell),
             Self::Appearance(command) => command.run(context, tell),
             Self::Compare(command) => command.run(context, tell),
-            Self::Enlarge(command) => command.run(context, tell),
             Self::Image(command) => command.run(context, tell),
             Self::Judge(command) => command.run(context, tell),
-        }
+            Self::Completions(command) => command.run(tell),
+            Self::Man(command) => command.run(tell),
+        };
+        single.map(|()| Ended::Done)
     }
 }
 
@@ -223,9 +242,29 @@ fn exit_code(kind: Kind) -> u8 {
 #[derive(Clone, Copy)]
 struct Tell {
     quiet: bool,
+    /// What is told was found done.
+    found: bool,
+    /// Errors are told as JSON, as progress is.
+    json: bool,
 }
 
 impl Tell {
+    /// Tells nothing but failures.
+    fn silent(self) -> Self {
+        Self { quiet: true, ..self }
+    }
+
+    /// Tells a stage as one that was found done, if it was.
+    fn found(self, found: bool) -> Self {
+        Self { found, ..self }
+    }
+
+    /// The first line of what is told of a stage.
+    fn stage(self, label: &str, text: &str) {
+        let found = if self.found { "found done: " } else { "" };
+        self.line(format!("{label:<10}{found}{text}"));
+    }
+
     /// One line. Whatever it names cannot end it, or change what the terminal shows.
     fn line(self, text: impl std::fmt::Display) {
         self.print(&escaped(&text.to_string()));
@@ -238,33 +277,65 @@ impl Tell {
 
     fn print(self, text: &str) {
         if !self.quiet {
+            self.as_it_is(&terminal::wrapped(text, terminal::of_output()));
+        }
+    }
+
+    /// A line that programs read: it is never wrapped.
+    fn as_it_is(self, text: &str) {
+        if !self.quiet {
             // A closed pipe (`btf info x | head -1`) is no failure.
             let _ = writeln!(std::io::stdout(), "{text}");
         }
     }
 
+    /// An error: of one of many inputs by its name, unless the message begins with it.
+    fn failure(self, name: Option<&str>, error: &Error) {
+        let mut text = error.to_string();
+        if let Some(name) = name.filter(|name| !text.starts_with(*name)) {
+            text = format!("{name}: {text}");
+        }
+        if self.json {
+            let line = serde_json::json!({
+                "event": "error", "exit_code": exit_code(error.kind()), "message": text, "advice": error.guidance(),
+            });
+            let _ = writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string()));
+            return;
+        }
+        let hint = error.guidance().map(|hint| format!("\n  {hint}")).unwrap_or_default();
+        let told = format!("btf: {text}{hint}");
+        let text = terminal::wrapped(&escaped_lines(&told), terminal::of_errors());
+        let _ = writeln!(std::io::stderr(), "{text}");
+    }
+
+    /// The last line of many; beside JSON on standard error.
+    fn count(self, beside_json: bool, text: &str) {
+        match beside_json {
+            true if self.json && !self.quiet => {
+                let line = serde_json::json!({"event": "count", "text": text});
+                drop(writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string())));
+            }
+            true if !self.quiet => drop(writeln!(std::io::stderr(), "btf: {}", escaped(text))),
+            _ => self.line(text),
+        }
+    }
+
+    /// JSON as one line.
+    fn json_line(self, value: &Value) {
+        self.as_it_is(&escaped_json(&value.to_string()));
+    }
+
     fn plan(self, summary: &Value) -> Result<()> {
         let text =
             serde_json::to_string_pretty(summary).map_err(|error| Error::internal(error.to_string()))?;
-        self.print(&escaped_json(&text));
+        self.as_it_is(&escaped_json(&text));
         Ok(())
     }
 }
 
-/// Bytes from text such as 512MiB, 2GiB, 2G or 1000000.
-fn parse_bytes(text: &str) -> std::result::Result<u64, String> {
-    let expected = || format!("expected a size such as 512MiB or 2GiB, got {text:?}");
-    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
-    let number: u64 = text[..digits].parse().map_err(|_| expected())?;
-    let shift = match text[digits..].trim().to_ascii_lowercase().as_str() {
-        "" | "b" => 0,
-        "k" | "kib" => 10,
-        "m" | "mib" => 20,
-        "g" | "gib" => 30,
-        "t" | "tib" => 40,
-        _ => return Err(expected()),
-    };
-    number.checked_mul(1 << shift).filter(|&bytes| bytes > 0).ok_or_else(expected)
+/// A report as JSON.
+fn as_json(report: &impl serde::Serialize) -> Result<Value> {
+    serde_json::to_value(report).map_err(|error| Error::internal(error.to_string()))
 }
 
 /// What a line about a result ends with.
@@ -273,11 +344,6 @@ fn found(made: Made) -> &'static str {
         Made::Written => "",
         Made::Found => ", found done",
     }
-}
-
-/// Bytes for people.
-fn bytes_text(bytes: u64) -> String {
-    indicatif::HumanBytes(bytes).to_string()
 }
 
 #[cfg(test)]

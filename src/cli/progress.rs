@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use btfkit::run::progress::{Counted, Progress};
+use btfkit::run::progress::{Counted, Progress, Stage};
 use btfkit::text::{escaped, escaped_json};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 
@@ -15,6 +15,7 @@ const LINE_INTERVAL: Duration = Duration::from_secs(1);
 #[derive(Default)]
 pub(super) struct Bars {
     bar: Mutex<Option<ProgressBar>>,
+    stage: Mutex<Option<Stage>>,
 }
 
 impl Bars {
@@ -22,6 +23,11 @@ impl Bars {
         if let Some(bar) = &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
             act(bar);
         }
+    }
+
+    fn show(&self, bar: ProgressBar) {
+        bar.enable_steady_tick(Duration::from_millis(200));
+        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
     }
 }
 
@@ -35,7 +41,14 @@ impl Progress for Bars {
                 "{prefix:>20} {bar:32} {bytes}/{total_bytes} ({bytes_per_sec}, {eta} left) {wide_msg}"
             }
         };
-        let bar = ProgressBar::new(total).with_prefix(escaped(title).into_owned());
+        let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        let prefix = match stage {
+            Some(stage) if stage.name == title => stage.to_string(),
+            Some(stage) => format!("{stage}, {title}"),
+            None => title.to_owned(),
+        };
+        self.end();
+        let bar = ProgressBar::new(total).with_prefix(escaped(&prefix).into_owned());
         let rate = |state: &ProgressState, to: &mut dyn std::fmt::Write| {
             let _ = write!(to, "{:.0}/s", state.per_sec());
         };
@@ -44,8 +57,17 @@ impl Progress for Bars {
         if let Counted::Items(name) = counted {
             bar.set_message(name);
         }
-        bar.enable_steady_tick(Duration::from_millis(200));
-        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar);
+        self.show(bar);
+    }
+
+    fn stage(&self, stage: Option<Stage>) {
+        self.end();
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
+        // Until its first step begins, and where it has none.
+        let Some(stage) = stage else { return };
+        let style = ProgressStyle::with_template("{prefix} {spinner}");
+        let style = style.unwrap_or_else(|_| ProgressStyle::default_spinner());
+        self.show(ProgressBar::new_spinner().with_style(style).with_prefix(stage.to_string()));
     }
 
     fn advance(&self, count: u64) {
@@ -63,12 +85,15 @@ impl Progress for Bars {
     }
 
     fn notice(&self, text: &str) {
-        let tell = || {
+        self.pause(&mut || {
             let _ = writeln!(std::io::stderr(), "btf: {}", escaped(text));
-        };
+        });
+    }
+
+    fn pause(&self, act: &mut dyn FnMut()) {
         match &*self.bar.lock().unwrap_or_else(PoisonError::into_inner) {
-            Some(bar) => bar.suspend(tell),
-            None => tell(),
+            Some(bar) => bar.suspend(act),
+            None => act(),
         }
     }
 }
@@ -77,6 +102,7 @@ impl Progress for Bars {
 #[derive(Default)]
 pub(super) struct Lines {
     step: Mutex<Option<Step>>,
+    stage: Mutex<Option<Stage>>,
 }
 
 struct Step {
@@ -87,6 +113,7 @@ struct Step {
     began: Instant,
     told: Instant,
     remark: Option<String>,
+    stage: Option<Stage>,
 }
 
 impl Step {
@@ -97,6 +124,7 @@ impl Step {
         let line = serde_json::json!({
             "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
             "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
+            "stage": self.stage.map(as_json),
         });
         write_line(&line);
     }
@@ -106,6 +134,10 @@ fn write_line(line: &serde_json::Value) {
     let _ = writeln!(std::io::stderr(), "{}", escaped_json(&line.to_string()));
 }
 
+fn as_json(stage: Stage) -> serde_json::Value {
+    serde_json::json!({"number": stage.number, "of": stage.of, "name": stage.name})
+}
+
 impl Progress for Lines {
     fn begin(&self, title: &str, total: u64, counted: Counted) {
         let unit = match counted {
@@ -113,8 +145,9 @@ impl Progress for Lines {
             Counted::Bytes => "bytes",
         };
         let now = Instant::now();
-        let step =
-            Step { title: title.to_owned(), unit, done: 0, total, began: now, told: now, remark: None };
+        let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        let title = title.to_owned();
+        let step = Step { title, unit, done: 0, total, began: now, told: now, remark: None, stage };
         step.tell("begin");
         *self.step.lock().unwrap_or_else(PoisonError::into_inner) = Some(step);
     }
@@ -138,6 +171,14 @@ impl Progress for Lines {
     fn end(&self) {
         if let Some(step) = self.step.lock().unwrap_or_else(PoisonError::into_inner).take() {
             step.tell("end");
+        }
+    }
+
+    fn stage(&self, stage: Option<Stage>) {
+        self.end();
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
+        if let Some(stage) = stage {
+            write_line(&serde_json::json!({"event": "stage", "stage": as_json(stage)}));
         }
     }
 

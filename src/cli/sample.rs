@@ -5,6 +5,7 @@ use btfkit::run::Context;
 use btfkit::sample::Kind;
 use btfkit::shape::Size;
 use btfkit::stage::sample;
+use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::{Tell, bytes_text, found, number};
@@ -22,8 +23,8 @@ pub(super) struct Sample {
     /// Which material
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
-    /// Size of its images, WIDTHxHEIGHT
-    #[arg(long, default_value = "128x128")]
+    /// Size of its images, WIDTHxHEIGHT, each from 1 to 65536
+    #[arg(long, default_value = "128x128", allow_hyphen_values = true)]
     size: Size,
     /// Number of views; 81 are those of UBO2003
     #[arg(long, default_value_t = 81)]
@@ -70,9 +71,9 @@ impl Sample {
             context,
         )?;
         tell.line(format!(
-            "{}: {} images, {}{}",
+            "{}: {}, {}{}",
             self.archive.display(),
-            report.images,
+            counted(report.images, "image"),
             bytes_text(report.bytes),
             found(report.made)
         ));

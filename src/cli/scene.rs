@@ -12,12 +12,12 @@ use super::number;
 #[derive(Args)]
 pub(super) struct SceneArgs {
     /// Light: theta,phi in degrees; phi counter-clockwise from the right
-    #[arg(long, default_value = "15,0")]
+    #[arg(long, default_value = "15,0", allow_hyphen_values = true)]
     pub(super) light: Direction,
     /// View: theta,phi in degrees
-    #[arg(long, default_value = "0,0")]
+    #[arg(long, default_value = "0,0", allow_hyphen_values = true)]
     pub(super) view: Direction,
-    /// Part to show: x,y,width,height
+    /// Part to show: x,y,width,height in texels, x and y of its top left corner
     #[arg(long, allow_hyphen_values = true)]
     window: Option<Area>,
     /// Factor on the linear values, above 0

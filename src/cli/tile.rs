@@ -56,7 +56,8 @@ impl Tile {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        tell_tile(&plan.run(context)?, tell);
+        let found = plan.is_done()?;
+        tell_tile(&plan.run(context)?, tell.found(found));
         Ok(())
     }
 }
@@ -89,7 +90,7 @@ pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
         ),
         None => "the whole measurement, its borders do not join".to_owned(),
     };
-    tell.line(format!("tile      {width}x{height} {seams}"));
+    tell.stage("tile", &format!("{width}x{height} {seams}"));
     let lattice = &report.lattice;
     let cells = WaveCounts(report.cells.clone()).cells();
     match lattice.vectors().len() {

@@ -4,11 +4,13 @@ use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
 use btfkit::text::escaped;
+use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
+use super::{Tell, as_json};
 
 /// Is a store or a pyramid whole and undamaged? Names what is not; --source compares a measurement with its archive
 #[derive(Args)]
@@ -21,11 +23,14 @@ Examples:
   btf verify wood.model.zarr
   btf verify wood-4k.zarr                           with its model, if that lies beside it; else --model names it
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
+  btf verify stores/*.zarr                          a line each, and a count
 Exit code 65 if something is damaged or different, 66 if something is missing.")]
 pub(super) struct Verify {
-    /// A measurement, a model, an enlarged index, or a Deep Zoom pyramid (its .dzi, or the folder of its tiles)
-    store: PathBuf,
-    /// The model of an enlarged index [default: beside it, under the name it had]
+    /// Measurements, models, enlarged indices and Deep Zoom pyramids (a .dzi, or the folder of its tiles); of several each
+    /// has a line
+    #[arg(required = true, value_name = "STORE")]
+    stores: Vec<PathBuf>,
+    /// The model of an enlarged index [default: where it lay when the index was made, or beside it]
     #[arg(long)]
     model: Option<PathBuf>,
     /// The archive that it was made of; may be given several times for one in pieces
@@ -39,15 +44,27 @@ pub(super) struct Verify {
 }
 
 impl Verify {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        let found = self.look(&self.store, context)?;
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        let [store] = self.stores.as_slice() else {
+            if !self.archive.is_empty() {
+                return Err(Error::usage(format!("got --source for {} stores", self.stores.len()))
+                    .hint("compare one store at a time with its archive"));
+            }
+            let name = |store: &PathBuf| store.display().to_string();
+            return each(&self.stores, name, self.json, context, tell, |store| {
+                let found = self.look(store, context)?;
+                let line =
+                    if self.json { Line::Json(as_json(&found)?) } else { Line::Text(in_short(&found)) };
+                Ok((line, judge(store, &found).err()))
+            });
+        };
+        let found = self.look(store, context)?;
         if self.json {
-            let report = serde_json::to_value(&found).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&report)?;
+            tell.plan(&as_json(&found)?)?;
         } else {
             tell.text(&told(&found));
         }
-        judge(&self.store, &found)
+        judge(store, &found).map(|()| Ended::Done)
     }
 
     /// Looks at one store or pyramid.
@@ -55,6 +72,16 @@ impl Verify {
         let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
         verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
     }
+}
+
+/// What was found of one of many that nothing is wrong with.
+fn in_short(found: &Found) -> String {
+    let (kind, notes) = match found {
+        Found::Measurement { report, .. } => ("measurement", &report.notes),
+        Found::Other(report) => (report.kind, &report.notes),
+    };
+    let notes: String = notes.iter().map(|note| format!("; note: {note}")).collect();
+    format!("{kind}, whole and undamaged{notes}")
 }
 
 /// What was found, for people.
@@ -120,20 +147,23 @@ fn judge(store: &Path, found: &Found) -> Result<()> {
     let findings = match found {
         Found::Measurement { report, .. } => {
             if !report.damaged.is_empty() {
-                let error = Error::input(format!("{store}: {} damaged chunks", report.damaged.len()));
+                let error =
+                    Error::input(format!("{store}: {}", counted(report.damaged.len(), "damaged chunk")));
                 let advice = "delete the files named and import again, if you have the archive: only their views are read";
                 return Err(error.hint(advice));
             }
             match report.different {
                 Some(count) if count > 0 => {
-                    let what = format!("{store}: {count} samples are not those of the archive");
+                    let what = format!("{store}: {} unlike the archive's", counted(count, "sample"));
                     return Err(Error::input(what));
                 }
                 _ => {}
             }
             if !report.views_missing.is_empty() {
-                let error =
-                    Error::missing(format!("{store}: {} views are missing", report.views_missing.len()));
+                let error = Error::missing(format!(
+                    "{store}: {} missing",
+                    counted(report.views_missing.len(), "view")
+                ));
                 return Err(
                     error.hint("run the command that makes this store again; it goes on where it stopped")
                 );

@@ -135,8 +135,11 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
     measure(settings, &archive, &measurement, &mut times, context)?;
     analyse(settings, &measurement, &model, &mut times, context)?;
     let coherent = enlarge::coherent::Options { jitter: None, keep_source: true, keep_normals: false };
-    let paper =
-        enlarge::paper::Options { candidates: settings.candidates, keep_normals: true, band_rows: None };
+    let paper = enlarge::paper::Options {
+        candidates: Some(settings.candidates),
+        keep_normals: true,
+        band_rows: None,
+    };
     for (step, output, by) in [
         ("enlarge", &enlarged, enlarge::By::Coherent(coherent)),
         ("enlarge by the paper's rule", &by_paper, enlarge::By::Paper(paper)),
@@ -218,6 +221,7 @@ fn analyse(
             model: model.clone(),
             amount: Amount::Clusters(settings.clusters),
             centre: CentreRule::Median,
+            first: None,
             sample: None,
             restarts: 1,
             time: None,

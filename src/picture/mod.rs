@@ -1,16 +1,20 @@
-//! Pictures: linear values or false colours, written as PNG (display) or EXR (values).
+//! Pictures: linear values or false colours, written as PNG, JPEG, WebP or TIFF (display) or EXR (values).
 
 pub mod chart;
 pub mod drawing;
+mod encoded;
+pub mod ending;
 pub mod false_color;
 pub mod stream;
 
 use std::path::Path;
 
-use crate::color::srgb_encode_all;
-use crate::error::{Error, Result};
+pub use ending::{Bits, Encoding, Ending};
+
+use crate::color::{srgb_encode, srgb_encode_all};
+use crate::error::Result;
 use crate::shape::{Size, Window};
-use crate::store::output::{Existing, Made, write_new};
+use crate::store::output::{Existing, Made};
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +35,16 @@ impl Meaning {
                 let byte = |value: &f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
                 values.zip(bytes).for_each(|(value, to)| *to = byte(value));
             }
+        }
+    }
+
+    /// 16-bit display values of pixels, three a pixel.
+    pub fn encode_wide(self, pixels: &[[f32; 3]], samples: &mut [u16]) {
+        for (&value, to) in pixels.as_flattened().iter().zip(samples) {
+            // What is no number is black.
+            let value = if value > 0.0 { f64::from(value.min(1.0)) } else { 0.0 };
+            let display = if self == Self::Linear { srgb_encode(value) } else { value };
+            *to = (display * 65535.0).round() as u16;
         }
     }
 }
@@ -137,53 +151,28 @@ impl Picture {
         Ok(bytes.into_inner())
     }
 
-    /// Writes a PNG or an EXR file, by the ending of its name; it appears whole or not at all.
+    /// Writes a file whose format the ending of its name says; it appears whole or not at all.
     ///
     /// # Errors
+    /// An ending that is not known, a size that the format does not take, those of writing, and
     /// [`crate::Kind::Recipe`] where another file is.
     pub fn write(&self, path: &Path, existing: Existing) -> Result<Made> {
-        let bytes = match Ending::of(path)? {
-            Ending::Png => self.png()?,
-            Ending::Exr => self.exr()?,
-        };
-        write_new(path, existing, &bytes)
+        let encoding = Encoding::of(path, &Ending::ALL)?;
+        let mut rows = self.pixels.chunks_exact(self.size.width);
+        stream::write(path, encoding, self.size, self.meaning, existing, |row| {
+            rows.next().into_iter().for_each(|pixels| row.copy_from_slice(pixels));
+            Ok(())
+        })
     }
 }
 
 /// The bytes of a PNG file of 8-bit display values, three a pixel.
 pub fn png(size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let mut writer = stream::png_header(&mut bytes, size)?;
+    let mut writer = stream::png_header(&mut bytes, size, Bits::Eight)?;
     writer.write_image_data(pixels).map_err(stream::png_failed)?;
     writer.finish().map_err(stream::png_failed)?;
     Ok(bytes)
-}
-
-/// Formats of pictures, by the endings of their names.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
-    /// 8-bit display values.
-    Png,
-    /// 32-bit float values.
-    Exr,
-}
-
-impl Ending {
-    /// The format that a name asks for.
-    ///
-    /// # Errors
-    /// [`crate::Kind::Usage`] for any other ending.
-    pub fn of(path: &Path) -> Result<Self> {
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        match ending.as_deref() {
-            Some("png") => Ok(Self::Png),
-            Some("exr") => Ok(Self::Exr),
-            _ => Err(Error::usage(format!(
-                "{}: expected a name that ends in .png (for displays) or .exr (linear values)",
-                path.display()
-            ))),
-        }
-    }
 }
 
 #[cfg(test)]

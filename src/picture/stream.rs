@@ -10,58 +10,73 @@ use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::Header;
 
 use crate::error::{Error, Result};
-use crate::picture::{Ending, Meaning};
+use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
 use crate::shape::Size;
 use crate::store::output::{Existing, Made, write_whole};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// Writes a PNG or an EXR file, by the ending of its name, from rows that `row` gives from the top down;
-/// it appears whole or not at all.
+/// Writes a picture file from rows that `row` gives from the top down; it appears whole or not at all.
+///
+/// PNG and EXR are written as the rows come; of other formats all rows are gathered first.
 ///
 /// # Errors
-/// Those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
+/// A size that the format does not take, those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
 pub fn write(
     path: &Path,
+    encoding: Encoding,
     size: Size,
     meaning: Meaning,
     existing: Existing,
     row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<Made> {
-    let ending = Ending::of(path)?;
-    write_whole(path, existing, |output| match ending {
-        Ending::Png => png(output, size, meaning, row),
+    encoding.check_size(size)?;
+    write_whole(path, existing, |output| match encoding.ending {
+        Ending::Png => png(output, encoding.bits, size, meaning, row),
         Ending::Exr => exr(output, size, row),
+        Ending::Jpeg | Ending::WebP | Ending::Tiff => encoded::write(output, encoding, size, meaning, row),
     })
 }
 
 /// A PNG of display values.
 fn png(
     output: impl Write,
+    bits: Bits,
     size: Size,
     meaning: Meaning,
     mut row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<()> {
-    let mut writer = png_header(output, size)?;
+    let mut writer = png_header(output, size, bits)?;
     let mut stream = writer.stream_writer_with_size(PIECE_BYTES).map_err(png_failed)?;
     let mut pixels = vec![[0.0; 3]; size.width];
-    let mut bytes = vec![0; 3 * size.width];
+    let mut bytes = vec![0; 3 * size.width * bits.bytes()];
+    let mut wide = vec![0u16; 3 * size.width];
     for _ in 0..size.height {
         row(&mut pixels)?;
-        meaning.encode(&pixels, &mut bytes);
+        match bits {
+            Bits::Eight => meaning.encode(&pixels, &mut bytes),
+            Bits::Sixteen => {
+                meaning.encode_wide(&pixels, &mut wide);
+                let samples = wide.iter().flat_map(|sample| sample.to_be_bytes());
+                bytes.iter_mut().zip(samples).for_each(|(to, byte)| *to = byte);
+            }
+        }
         stream.write_all(&bytes).map_err(refused)?;
     }
     stream.finish().map_err(png_failed)?;
     writer.finish().map_err(png_failed)
 }
 
-/// Begins a PNG of 8-bit sRGB values.
-pub(super) fn png_header<W: Write>(output: W, size: Size) -> Result<png::Writer<W>> {
+/// Begins a PNG of sRGB values.
+pub(super) fn png_header<W: Write>(output: W, size: Size, bits: Bits) -> Result<png::Writer<W>> {
     let side = |texels: usize| u32::try_from(texels).unwrap_or(0);
     let mut encoder = png::Encoder::new(output, side(size.width), side(size.height));
     encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_depth(match bits {
+        Bits::Eight => png::BitDepth::Eight,
+        Bits::Sixteen => png::BitDepth::Sixteen,
+    });
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     encoder.write_header().map_err(png_failed)
 }
@@ -75,7 +90,7 @@ pub(super) fn png_failed(error: png::EncodingError) -> Error {
 }
 
 /// What the operating system refused; the caller knows the path.
-fn refused(error: std::io::Error) -> Error {
+pub(super) fn refused(error: std::io::Error) -> Error {
     Error::refused("write", error)
 }
 

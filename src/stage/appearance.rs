@@ -58,6 +58,12 @@ impl Plan {
         json!({"stage": "appearance", "model": self.model.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    pub fn is_done(&self) -> bool {
+        // Another recipe is made anew.
+        self.model.is_done(Stage::Appearance, &self.recipe).unwrap_or(false)
+    }
+
     /// Fits the appearance, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<AppearanceReport> {
         let Some(_lock) = self.model.begin(Stage::Appearance, &self.recipe, context)? else {

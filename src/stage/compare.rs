@@ -9,7 +9,8 @@ use crate::error::Result;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::stage::cluster::open_measurement_of;
-use crate::store::model::Model;
+use crate::stage::image::of_stage;
+use crate::store::model::{Model, Stage};
 
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
@@ -126,7 +127,8 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let model = Model::open(&options.model)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
     let description = measurement.description();
-    let (tile, index, representatives) = (model.tile()?, model.index()?, model.representatives()?);
+    let (tile, index) = (model.tile()?, of_stage(&model, Stage::Cluster, Model::index)?);
+    let representatives = of_stage(&model, Stage::Cluster, Model::representatives)?;
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
     let (texel, channels) = (description.texel_samples(), description.n_channels());
     let decoder = description.decoder()?;

@@ -12,14 +12,11 @@ use crate::color::{Remarkable, Transfer};
 use crate::error::{Error, Kind, Result};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
-use crate::run::{Context, units};
+use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::store::codec::Chain;
 use crate::store::gather::Images;
 use crate::store::measurement::{Description, Measurement, Origin};
-
-/// Views in flight: one is written while the next is decoded; the threads share the work of each.
-const VIEWS_IN_FLIGHT: usize = 2;
 
 /// How an archive is turned into a measurement.
 #[derive(Clone, Debug)]
@@ -167,6 +164,12 @@ impl Plan<'_> {
 
     /// Imports the views that are not in the store yet.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let unit = format!(
+            "importing views of {} under {} lights",
+            self.description.size,
+            self.description.lights.len()
+        );
+        context.require(&unit, self.unit_bytes())?;
         let contents = self.source.contents();
         let origin =
             Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
@@ -178,30 +181,31 @@ impl Plan<'_> {
         context.progress.begin("import", self.images(), Counted::Items("images"));
         context.progress.advance((found.len() * self.description.lights.len()) as u64);
         let codes = self.description.codes()?;
-        let in_flight = units::in_flight(context, self.unit_bytes()).min(VIEWS_IN_FLIGHT);
+        let in_flight = read_ahead::in_flight(context.work_bytes(), self.unit_bytes());
         let Description { size, sample_type, .. } = self.description;
         let channels = self.description.n_channels();
-        let results = units::for_each(context, &missing, in_flight, |&view| {
-            // A broken image does not keep the others from being looked at: all are named at the end.
-            match context.install(|| read_view(self.source, view, self.options.white, context)) {
-                Err(error) if error.kind() == Kind::Input => Ok(Err(error.to_string())),
-                Err(error) => Err(error),
-                Ok((images, before)) => context.install(|| {
-                    let images = Images::new(size, channels, sample_type, images)?;
-                    let stored = measurement.write_view(view, &images, &codes)?;
-                    Ok(Ok(before.unwrap_or(stored)))
-                }),
-            }
-        })?;
-        context.progress.end();
         let mut samples = Remarkable::default();
         let mut problems = Vec::new();
-        for result in results {
-            match result {
-                Ok(found) => samples += found,
+        // One view is written while the next is decoded; the threads share the work of each.
+        let read = |&view: &usize| match read_view(self.source, view, self.options.white, context) {
+            // A broken image does not keep the others from being looked at: all are named at the end.
+            Err(error) if error.kind() == Kind::Input => Ok((view, Err(error.to_string()))),
+            images => Ok((view, Ok(images?))),
+        };
+        read_ahead::for_each(context, in_flight, &missing, read, |(view, images)| {
+            match images {
+                Ok((images, before)) => {
+                    let stored = context.install(|| {
+                        let images = Images::new(size, channels, sample_type, images)?;
+                        measurement.write_view(view, &images, &codes)
+                    })?;
+                    samples += before.unwrap_or(stored);
+                }
                 Err(problem) => problems.push(problem),
             }
-        }
+            Ok(())
+        })?;
+        context.progress.end();
         if !problems.is_empty() {
             return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));

@@ -61,10 +61,21 @@ pub fn plan(options: &Options) -> Result<Plan> {
     Ok(Plan { measurement, model, robust: options.robust, recipe })
 }
 
+/// Memory of a texel of the normal map: twice its normal, and what is written of it.
+const TEXEL_BYTES: u64 = 48;
+
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
         json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
+    }
+
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Normals, &self.recipe)
     }
 
     /// Estimates the normal map, unless that is done.
@@ -76,6 +87,9 @@ impl Plan {
         let view = frontal_view(&self.measurement);
         let tile = self.model.tile()?;
         let bounds = tile.bounds();
+        let band = (BAND_ROWS * bounds.size.width * description.texel_bytes()) as u64;
+        let needed = 2 * band + TEXEL_BYTES * bounds.size.texels() as u64;
+        context.require(&format!("normals of {}", bounds.size), needed)?;
         context.progress.begin("normals", bounds.size.height as u64, Counted::Items("rows"));
         let plane = of_window(&self.measurement, view, self.robust, bounds, context)?;
         context.progress.end();
@@ -108,7 +122,7 @@ pub(crate) fn of_window(
     };
     let mut normals = Vec::with_capacity(window.size.texels());
     let band_bytes = (BAND_ROWS * window.size.width * description.texel_bytes()) as u64;
-    let in_flight = read_ahead::in_flight(context.memory_bytes, band_bytes);
+    let in_flight = read_ahead::in_flight(context.work_bytes(), band_bytes);
     let read = |top: usize| {
         let rows = BAND_ROWS.min(window.size.height - top);
         let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };

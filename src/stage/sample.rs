@@ -14,6 +14,9 @@ use crate::sample::{Kind, Scene, Surface};
 use crate::shape::Size;
 use crate::store::output::{self, Made};
 
+/// Memory of a texel of the surface beside its images (measured).
+const TEXEL_BYTES: u64 = 500;
+
 /// What to make.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -80,6 +83,9 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let (views, lights) = (directions(options.views)?, directions(options.lights)?);
     let radians = |angles: &Angles| [angles.theta_deg().to_radians(), angles.phi_deg().to_radians()];
     let Size { height, width } = options.size;
+    let texels = options.size.texels() as u64;
+    let needed = texels * (TEXEL_BYTES + 2 * 3 * lights.len() as u64);
+    context.require(&format!("a sample of {} under {} lights", options.size, lights.len()), needed)?;
     let surface = Surface::new(options.kind, width, height, options.scale, options.seed)?;
     let light_angles: Vec<[f64; 2]> = lights.iter().map(radians).collect();
     context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));

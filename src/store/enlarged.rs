@@ -13,6 +13,7 @@ use crate::shape::{Size, Window};
 use crate::store::checksums::DIGITS;
 use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::{NARROW, Stage, is_unit};
+use crate::store::model_place;
 use crate::store::{Array, DAMAGED, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
@@ -150,7 +151,7 @@ pub struct Texels<'a> {
 impl Enlarged {
     /// Starts an enlarged index, or goes on with one that the same recipe began.
     ///
-    /// `model` is the model's place; its name is kept, to find it beside the result.
+    /// `model` is the model's place; its name and the way to it are kept, to find it again.
     pub fn create(
         path: &Path,
         description: &Description,
@@ -165,6 +166,7 @@ impl Enlarged {
             "model_name": model_name, "clusters": clusters, "tile": [tile.height, tile.width],
         });
         let lock = store.begin_by_recipe(KIND, recipe, more, context)?;
+        model_place::note(path, model)?;
         let facts = Facts::read(&store)?;
         let index = store.create_array("index", &index_layout(size, clusters > NARROW))?;
         let source =

@@ -17,6 +17,7 @@ pub mod mapped;
 pub mod measurement;
 pub mod metadata;
 pub mod model;
+pub(crate) mod model_place;
 pub mod output;
 pub mod passes;
 mod read;

@@ -4,7 +4,7 @@
 //! | array | shape | type |
 //! | --- | --- | --- |
 //! | `pass_<p>/centres` | [cluster, view, light] | u8, the L* codes that pass p assigns to |
-//! | `pass_<p>/index` | [slot] | u16, the assignment that the pass before made; a slot is a texel's place in the order of reading |
+//! | `pass_<p>/index` | [slot] | u16, the assignment that the pass before made, of the texels that it went over; a slot is a texel's place in the order of reading |
 //! | `pass_<p>/part_<n>/index` | [slot] | u16, what pass p assigned in part n |
 //! | `pass_<p>/part_<n>/texels`, `counts` | [cluster], [cluster, count] | u32, what centres follow from |
 //!
@@ -39,7 +39,7 @@ pub struct Passes {
 pub struct State {
     /// Centres [cluster, view, light].
     pub centres: Vec<u8>,
-    /// The assignment that the pass before made, by slot; none before the first pass.
+    /// The assignment that the pass before made, by slot, of the texels that it went over; none before the first pass.
     pub index: Vec<u16>,
     /// How it came here.
     pub history: History,
@@ -50,6 +50,12 @@ pub struct State {
 pub struct History {
     /// Passes over all texels.
     pub passes: Vec<Pass>,
+    /// Passes over mini-batches before these.
+    #[serde(default)]
+    pub batches: Vec<BatchPass>,
+    /// How many of the first blocks the pass goes over, where it is a mini-batch; all where there is none.
+    #[serde(default)]
+    pub batch: Option<usize>,
     /// Texels of the first approach.
     pub sample_texels: usize,
     /// Passes over these.
@@ -60,7 +66,24 @@ pub struct History {
     pub attempts: Vec<Trial>,
 }
 
-/// What a pass found in a part of the texels, or in all.
+/// One pass over a mini-batch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BatchPass {
+    /// Texels of the mini-batch.
+    pub texels: usize,
+    /// What it found.
+    #[serde(flatten)]
+    pub pass: Pass,
+}
+
+impl History {
+    /// Slots that the pass before went over.
+    fn slots_before(&self, all: usize) -> usize {
+        if self.passes.is_empty() { self.batches.last().map_or(0, |batch| batch.texels) } else { all }
+    }
+}
+
+/// What a pass found in a part of the texels that it goes over, or in all of them.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The assignment, by slot.
@@ -71,13 +94,19 @@ pub struct Found {
     pub nearest: Vec<Near>,
     /// The texels farthest from theirs.
     pub farthest: Farthest,
-    /// Sum of the distances.
-    pub objective: u64,
+    /// Sum of the distances of each cluster's texels.
+    pub distances: Vec<u64>,
     /// Texels that changed their cluster.
     pub moved: usize,
 }
 
 impl Found {
+    /// Sum of the distances.
+    pub fn objective(&self) -> u64 {
+        // What lies on disk may be anything.
+        self.distances.iter().fold(0, |sum, &distance| sum.saturating_add(distance))
+    }
+
     /// Together with what was found in the part that follows.
     #[must_use]
     pub fn with(mut self, next: Self) -> Self {
@@ -85,7 +114,8 @@ impl Found {
         self.tally.merge(&next.tally);
         self.nearest = nearer(self.nearest, next.nearest);
         self.farthest.add(next.farthest.texels().iter().copied());
-        self.objective += next.objective;
+        let sums = self.distances.iter_mut().zip(next.distances);
+        sums.for_each(|(sum, more)| *sum = sum.saturating_add(more));
         self.moved += next.moved;
         self
     }
@@ -96,7 +126,7 @@ impl Found {
 struct PartAttributes {
     nearest: Vec<Near>,
     farthest: Vec<Near>,
-    objective: u64,
+    distances: Vec<u64>,
     moved: usize,
 }
 
@@ -143,7 +173,7 @@ impl Passes {
         Ok(None)
     }
 
-    /// What a pass begins with; `brdf` are its views and lights.
+    /// What a pass begins with; `brdf` are its views and lights, `slots` those of all texels.
     pub fn state(&self, pass: usize, brdf: [usize; 2], slots: usize) -> Result<State> {
         let name = pass_name(pass);
         let history = self.attributes(&name)?.ok_or_else(|| {
@@ -153,11 +183,15 @@ impl Passes {
         let (_, centres) = self.store.read::<u8>(&format!("{name}/centres"), &[0, brdf[0], brdf[1]])?;
         let clusters = centres.len() / (brdf[0] * brdf[1]);
         let history: History = history;
-        let index = if history.passes.is_empty() {
+        let before = history.slots_before(slots);
+        let index = if before == 0 {
             Vec::new()
         } else {
-            self.store.read::<u16>(&format!("{name}/index"), &[slots])?.1
+            self.store.read::<u16>(&format!("{name}/index"), &[before])?.1
         };
+        if before > slots {
+            return Err(self.damaged(&name, "a mini-batch of more texels than there are"));
+        }
         if index.iter().any(|&cluster| usize::from(cluster) >= clusters) {
             return Err(self.damaged(&name, "a cluster beyond the last"));
         }
@@ -170,7 +204,7 @@ impl Passes {
         let shape = [state.centres.len() / (brdf[0] * brdf[1]), brdf[0], brdf[1]];
         let layout = Layout::small::<u8>(&["cluster", "view", "light"], &shape);
         self.store.write(&format!("{name}/centres"), &layout, &state.centres)?;
-        if !state.history.passes.is_empty() {
+        if !state.index.is_empty() {
             let layout = Layout::small::<u16>(&["slot"], &[state.index.len()]);
             self.store.write(&format!("{name}/index"), &layout, &state.index)?;
         }
@@ -196,7 +230,7 @@ impl Passes {
         stride: usize,
     ) -> Result<Found> {
         let name = part_name(pass, part);
-        let PartAttributes { nearest, farthest, objective, moved } =
+        let PartAttributes { nearest, farthest, distances, moved } =
             self.attributes(&name)?.ok_or_else(|| {
                 Error::missing(format!("{}: {name} is not there yet", self.store.path().display()))
                     .hint("run the shards that are missing: --step assign")
@@ -205,10 +239,11 @@ impl Passes {
         let (_, texels) = self.store.read::<u32>(&format!("{name}/texels"), &[nearest.len()])?;
         let (_, counts) = self.store.read::<u32>(&format!("{name}/counts"), &[nearest.len(), 0])?;
         let whole = texels.iter().map(|&texels| u64::from(texels)).sum::<u64>() == slots as u64
+            && distances.len() == nearest.len()
             && index.iter().all(|&cluster| usize::from(cluster) < nearest.len());
         let tally = Tally::from_parts(rule, stride, texels, counts).filter(|_| whole);
         let tally = tally.ok_or_else(|| self.damaged(&name, "its arrays do not fit together"))?;
-        Ok(Found { index, tally, nearest, farthest: Farthest::of(farthest), objective, moved })
+        Ok(Found { index, tally, nearest, farthest: Farthest::of(farthest), distances, moved })
     }
 
     /// Writes what a pass found in a part.
@@ -225,7 +260,7 @@ impl Passes {
         let attributes = PartAttributes {
             nearest: found.nearest.clone(),
             farthest: found.farthest.texels().to_vec(),
-            objective: found.objective,
+            distances: found.distances.clone(),
             moved: found.moved,
         };
         self.write_attributes(&name, &attributes)

@@ -26,39 +26,102 @@ fn cluster(model: &Path) -> Command {
     command
 }
 
+/// Where the first centres come from: by default, which is a sample, or from mini-batches.
+const FIRSTS: [&[&str]; 2] = [&[], &["--first", "minibatch"]];
+
 fn report(model: &Path) -> Report {
     Model::open(model).unwrap().report(Stage::Cluster).unwrap()
 }
 
 #[test]
 fn threads_kernels_and_memory_change_no_byte() {
+    for first in FIRSTS {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, three] = ["one", "three"].map(|name| plane(folder.path(), name));
+        // Little memory keeps neither blocks nor more than a few columns of bounds.
+        let little = ["--threads", "1", "--memory", "68MiB"];
+        succeed(cluster(&one).args(first).args(little).env("BTFKIT_KERNEL", "plain"));
+        succeed(cluster(&three).args(first).args(["--threads", "3", "--memory", "4GiB"]));
+        assert_same(&one, &three);
+        let report = report(&one);
+        assert!(report.passes.len() == 6, "{report:?}");
+        assert!(report.batches.is_empty() == first.is_empty());
+        assert_eq!(report.sample_texels, 200);
+        assert!(!one.join("clustering").exists());
+        fail(cluster(&plane(folder.path(), "none")).args(first).args(["--memory", "20MiB"]), 2);
+    }
+}
+
+#[test]
+fn mini_batches_double_and_each_pass_of_one_lowers_its_objective() {
     let folder = tempfile::tempdir().unwrap();
-    let [one, three] = ["one", "three"].map(|name| plane(folder.path(), name));
-    // Little memory keeps neither blocks nor more than a few columns of bounds.
-    succeed(cluster(&one).args(["--threads", "1", "--memory", "68MiB"]).env("BTFKIT_KERNEL", "plain"));
-    succeed(cluster(&three).args(["--threads", "3", "--memory", "4GiB"]));
-    assert_same(&one, &three);
-    assert!(report(&one).passes.len() == 6 && report(&one).sample_texels == 200);
-    assert!(!one.join("clustering").exists());
-    fail(cluster(&plane(folder.path(), "none")).args(["--memory", "20MiB"]), 2);
+    let model = plane(folder.path(), "model");
+    let options = ["--clusters", "20", "--sample", "80", "--passes", "6", "--tolerance", "0"];
+    let mut command = btf();
+    command.arg("cluster").args([&fixture().measurement(), &model]).args(options);
+    succeed(command.args(["--first", "minibatch"]));
+    let Report { batches, sample_texels, .. } = report(&model);
+    let texels = fixture_texels();
+    assert!(sample_texels == 80 && batches[0].texels >= 8 * sample_texels);
+    assert!(batches.windows(2).any(|pair| pair[1].texels > pair[0].texels), "{batches:?}");
+    for pair in batches.windows(2) {
+        let (before, after) = (pair[0].texels, pair[1].texels);
+        assert!(after == before || (after >= 2 * before && after < texels), "{batches:?}");
+        assert!(after > before || pair[1].pass.objective <= pair[0].pass.objective, "{batches:?}");
+        // Texels that join count as moved, those that stay go on with their clusters.
+        assert!(after == before || pair[1].pass.moved >= after - before, "{batches:?}");
+    }
+    let moved = batches.iter().filter(|batch| batch.pass.moved == batch.texels).count();
+    assert_eq!(moved, 1, "{batches:?}");
+    assert!(2 * batches.last().unwrap().texels >= texels - 256);
+}
+
+fn fixture_texels() -> usize {
+    Measurement::open(&fixture().measurement()).unwrap().description().size.texels()
+}
+
+#[test]
+fn mini_batches_also_serve_where_all_texels_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = |name: &str, more: &[&str]| {
+        let model = plane(folder.path(), name);
+        let measurement = fixture().measurement();
+        succeed(btf().arg("cluster").args([&measurement, &model]).args(["--clusters", "20"]).args(more));
+        report(&model)
+    };
+    let all = command("all", &[]);
+    let whole = command("whole", &["--first", "minibatch"]);
+    assert_eq!((all.sample_texels, whole.sample_texels), (0, 0));
+    assert_eq!(all.passes, whole.passes);
+    let batches = command("batches", &["--first", "minibatch", "--sample", "300"]);
+    assert!(batches.sample_texels == 300 && !batches.batches.is_empty());
+    let error = |report: &Report| report.passes.last().unwrap().mean_lightness_error;
+    assert!(error(&batches) <= 1.02 * error(&all), "{} against {}", error(&batches), error(&all));
+    fail(
+        btf()
+            .arg("cluster")
+            .args([&fixture().measurement(), &plane(folder.path(), "x")])
+            .args(["--first", "all"]),
+        2,
+    );
 }
 
 #[test]
 fn any_number_of_shards_gives_the_bytes_of_one_process() {
-    let folder = tempfile::tempdir().unwrap();
-    let whole = plane(folder.path(), "whole");
-    succeed(&mut cluster(&whole));
-    for shards in [1, 2, 7, 40] {
+    for (first, shards) in [(0, 1), (0, 2), (0, 7), (0, 40), (1, 1), (1, 5)] {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = plane(folder.path(), "whole");
+        succeed(cluster(&whole).args(FIRSTS[first]));
         let model = plane(folder.path(), &format!("shards-{shards}"));
         let step = |step: &str, more: &[&str]| {
             let mut command = cluster(&model);
-            command.args(["--step", step]).args(more);
+            command.args(FIRSTS[first]).args(["--step", step]).args(more);
             command
         };
         fail(&mut step("assign", &[]), 66);
         succeed(&mut step("prepare", &[]));
         fail(&mut step("reduce", &[]), 66);
-        for pass in 0..6 {
+        for pass in 0..6 + report(&whole).batches.len() {
             let pass = pass.to_string();
             // Backwards, and the first one twice: two runs of one shard are normal on a cluster.
             for shard in (0..shards).rev().chain([0]) {
@@ -68,7 +131,7 @@ fn any_number_of_shards_gives_the_bytes_of_one_process() {
             succeed(&mut step("reduce", &["--pass", &pass]));
         }
         assert_same(&model, &whole);
-        let told = succeed(&mut step("assign", &["--pass", "9"]));
+        let told = succeed(&mut step("assign", &["--pass", "99"]));
         assert!(told.contains("20"), "{told}");
     }
 }
@@ -166,7 +229,10 @@ fn a_sample_and_passes_come_within_a_hundredth_of_all_texels_in_memory() {
 #[test]
 fn the_fewest_clusters_for_an_error_and_the_most_for_a_ratio() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, sample) in [("memory", &[][..]), ("streamed", &["--sample", "700"][..])] {
+    let minibatch = ["--sample", "300", "--first", "minibatch"];
+    for (name, sample) in
+        [("memory", &[][..]), ("streamed", &["--sample", "700"][..]), ("minibatch", &minibatch[..])]
+    {
         let model = plane(folder.path(), name);
         let measurement = fixture().measurement();
         succeed(btf().arg("cluster").args([&measurement, &model]).args(["--error", "3"]).args(sample));
@@ -175,6 +241,14 @@ fn the_fewest_clusters_for_an_error_and_the_most_for_a_ratio() {
         // What was tried with the next fewer clusters left more.
         let fewer = report.trials.iter().rev().find(|trial| trial.clusters < report.clusters).unwrap();
         assert!(fewer.mean_lightness_error > 3.0 && fewer.clusters * 5 >= report.clusters * 4, "{report:?}");
+    }
+    // More clusters than the sample has texels cannot be tried.
+    for first in FIRSTS {
+        let model = plane(folder.path(), &format!("few-{}", first.len()));
+        let options = ["--error", "0.5", "--sample", "30"];
+        let mut command = btf();
+        command.arg("cluster").args([&fixture().measurement(), &model]).args(options).args(first);
+        assert!(fail(&mut command, 2).contains("--sample"));
     }
     let model = plane(folder.path(), "ratio");
     succeed(btf().arg("cluster").args([&fixture().measurement(), &model]).args(["--ratio", "50"]));
@@ -215,9 +289,11 @@ fn a_tile_takes_the_clusters_of_its_plane() {
 #[test]
 fn time_that_is_over_ends_a_clustering_after_a_pass() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, sample) in [("memory", "99999"), ("streamed", "200")] {
+    for (name, first, sample) in
+        [("memory", "sample", "99999"), ("streamed", "sample", "200"), ("minibatch", "minibatch", "200")]
+    {
         let model = plane(folder.path(), name);
-        let options = ["--clusters", "20", "--sample", sample, "--time", "0"];
+        let options = ["--clusters", "20", "--first", first, "--sample", sample, "--time", "0"];
         succeed(btf().arg("cluster").args([&fixture().measurement(), &model]).args(options));
         let report = report(&model);
         assert_eq!((report.passes.len(), report.ended), (1, Ended::Time));

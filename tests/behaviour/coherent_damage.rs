@@ -219,7 +219,7 @@ fn a_damaged_enlarged_index_is_refused() {
             let mut command = btf();
             command.arg("image").arg(store).arg("--model").arg(model("cut"));
             command.arg("--measurement").arg(crate::fixture::fixture().measurement());
-            command.args(["--values", values, "--out"]).arg(store.with_extension("png"));
+            command.args(["--values", values, "--out"]).arg(store.with_extension(format!("{values}.png")));
             command
         }
     };

@@ -117,8 +117,9 @@ fn use_it(path: &Path, context: &Context<'_>) {
     };
     let show = |subject: Subject| -> Result<()> {
         let scene = Scene::open(&picture(subject), context)?;
-        for rows in scene.bands(1 << 24)?.take(2) {
-            scene.read(rows, context)?;
+        let height = scene.size().height;
+        for first in (0..height).step_by(64).take(2) {
+            scene.read(first..(first + 64).min(height), context)?;
         }
         Ok(())
     };

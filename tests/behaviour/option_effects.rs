@@ -141,8 +141,8 @@ pub(crate) const RECIPES: &[Recipes] = &[
     Recipes {
         command: "model",
         options: &[
-            ("measurement", PLACE),
-            ("model", PLACE),
+            ("paths", PLACE),
+            ("into", PLACE),
             ("tile", Changes(&["--tile", "none"])),
             ("lattice", Changes(&["--lattice", "none"])),
             ("seed", Changes(&["--seed", "2"])),
@@ -168,8 +168,8 @@ pub(crate) const RECIPES: &[Recipes] = &[
     Recipes {
         command: "enlarge",
         options: &[
-            ("model", PLACE),
-            ("output", PLACE),
+            ("paths", PLACE),
+            ("into", PLACE),
             ("size", Changes(&["--size", "96x64"])),
             ("method", Changes(&["--method", "paper"])),
             ("seed", Changes(&["--seed", "2"])),

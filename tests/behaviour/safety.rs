@@ -56,7 +56,7 @@ fn every_option_that_changes_bytes_changes_the_recipe_and_no_other_does() {
                     );
                 }
                 Effect::Keeps(arguments) => {
-                    assert_eq!(recipe(run().args(*arguments)), plain, "{} {option}", of.command)
+                    assert_eq!(recipe(run().args(*arguments)), plain, "{} {option}", of.command);
                 }
                 Effect::Apart(_) => {}
             }
@@ -389,13 +389,13 @@ fn what_may_not_be_read_is_not_called_damaged() {
     }
     let probe = folder.path().join("probe");
     fs::write(&probe, b"").unwrap();
-    fs::set_permissions(&probe, fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(&probe, fs::Permissions::from_mode(0o0)).unwrap();
     if fs::read(&probe).is_ok() {
         println!("skipped: this user may read everything");
         return;
     }
     for file in ["reflectance/c/0/0/0/0/0", "luminance/c/0/0/0/0", "luminance/zarr.json", "zarr.json"] {
-        fs::set_permissions(store.join(file), fs::Permissions::from_mode(0)).unwrap();
+        fs::set_permissions(store.join(file), fs::Permissions::from_mode(0o0)).unwrap();
         let told = fail(btf().arg("check").arg(&store), 74);
         assert!(!told.contains("damaged") && !told.contains("delete"), "{file}: {told}");
         fs::set_permissions(store.join(file), fs::Permissions::from_mode(0o644)).unwrap();
@@ -459,7 +459,7 @@ fn threads_have_bounds() {
     // Threads that the system refuses, and memory that there is not: an error, no panic and no abort.
     let output = limited("ulimit -v 600000", &arguments("1000")).output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(matches!(output.status.code(), Some(0 | 1 | 2)) && !told.contains("panicked"), "{output:?}");
+    assert!(matches!(output.status.code(), Some(0..=2)) && !told.contains("panicked"), "{output:?}");
 }
 
 #[test]

@@ -18,6 +18,7 @@ use super::finding::{Check, Finding, Severity, confidence, round};
 use super::plane::{Plane, height_of_slopes};
 use super::statistics::Statistics;
 use crate::texel::stereo::Stereo;
+use crate::words::counted;
 
 /// Name of the check.
 pub const NAME: &str = "azimuth";
@@ -259,7 +260,7 @@ fn views(statistics: &Statistics, surface: &Surface, lights: Reading) -> Result<
         displaced.push((direction.phi_rad, Complex::new(found[0], found[1])));
     }
     if displaced.len() < LEAST_VIEWS {
-        return Err(format!("{} views with parallax, expected {LEAST_VIEWS}", displaced.len()));
+        return Err(format!("{} with parallax, expected {LEAST_VIEWS}", counted(displaced.len(), "view")));
     }
     let count = displaced.len() as f64;
     let length = displaced.iter().map(|(_, by)| by.norm()).sum::<f64>() / count;

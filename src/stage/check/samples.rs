@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::finding::{Check, Finding, Place, Severity, confidence, listed, names, round};
 use super::statistics::Statistics;
+use crate::words::counted;
 
 /// Name of the check of impossible numbers.
 pub const NUMBERS: &str = "numbers";
@@ -56,7 +57,11 @@ pub fn numbers(statistics: &Statistics) -> Check {
             code: "not-finite",
             severity: Severity::Fault,
             confidence: 1.0,
-            message: format!("{count} samples are NaN or infinite, in {}", names(&only(&bad), statistics)),
+            message: format!(
+                "{} NaN or infinite, in {}",
+                counted(count, "sample"),
+                names(&only(&bad), statistics)
+            ),
             evidence: json!({"samples": count, "images": listed(&bad)}),
             repair: None,
             directions: only(&bad),
@@ -73,7 +78,8 @@ pub fn numbers(statistics: &Statistics) -> Check {
             severity: if times > 1.0 { Severity::Fault } else { Severity::Note },
             confidence: if times > 1.0 { confidence(times) } else { 1.0 },
             message: format!(
-                "{count} samples ({:.3} %) are below zero, down to {least}, in {}",
+                "{} ({:.3} %) below zero, down to {least}, in {}",
+                counted(count, "sample"),
                 100.0 * share,
                 names(&only(&negative), statistics)
             ),
@@ -82,8 +88,11 @@ pub fn numbers(statistics: &Statistics) -> Check {
             directions: only(&negative),
         });
     }
-    let detail =
-        if count > 0 { format!("{count} samples below zero, the least {least}") } else { String::new() };
+    let detail = if count > 0 {
+        format!("{} below zero, the least {least}", counted(count, "sample"))
+    } else {
+        String::new()
+    };
     Check::done(NUMBERS, detail, times, findings)
 }
 
@@ -109,7 +118,7 @@ pub fn black(statistics: &Statistics) -> Check {
         code: "black-image",
         severity: Severity::Fault,
         confidence: confidence(alarm),
-        message: format!("{} images are black: {}", found.len(), names(&found, statistics)),
+        message: format!("{} black: {}", counted(found.len(), "image"), names(&found, statistics)),
         evidence: json!({"mean": listed(&values)}),
         repair: whole_view.map(|view| format!("--drop-view {view}")),
         directions: found,

@@ -1,5 +1,5 @@
-//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from
-//! the whole measurement.
+//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from the
+//! whole measurement or from the first mini-batch.
 
 use std::time::Instant;
 
@@ -62,6 +62,15 @@ impl Plan {
         let mut trials = Trials::new(&points, method, self.options.seed);
         let clustering = context.install(|| trials.run(clusters, context))?;
         context.progress.end();
+        if let Some(last) = history.attempts.last().filter(|last| clustering.nearest.len() <= last.clusters) {
+            return Err(Error::usage(format!(
+                "{} clusters, as many as a sample of {} texels gives, leave a mean |dL*| of {:.3}",
+                last.clusters,
+                points.len(),
+                last.mean_lightness_error
+            ))
+            .hint("choose a larger --error or a larger --sample"));
+        }
         let state = self.state_of(clustering, history);
         passes.write_state(pass, self.brdf(), &state)?;
         Ok(state)
@@ -84,6 +93,8 @@ impl Plan {
             index: Vec::new(),
             history: History {
                 passes: Vec::new(),
+                batches: Vec::new(),
+                batch: self.first_batch(),
                 sample_texels: self.sample_texels(),
                 sample_passes: clustering.passes,
                 ..history
@@ -134,13 +145,15 @@ impl Plan {
 
     /// Reads the texels of the sample, in the order of their numbers.
     pub(super) fn read_sample(&self, context: &Context<'_>) -> Result<Points> {
-        let sample = self.selection.sample(self.sample_texels(), self.options.seed);
+        let blocks = self.first_batch().unwrap_or(self.selection.blocks().len());
+        let sample = self.selection.sample(blocks, self.sample_texels(), self.options.seed);
         let stride = self.arrangement.stride();
         let mut vectors = vec![0; sample.len() * stride];
         let title = if self.fits_the_sample() { "read luminance" } else { "read sample" };
-        context.progress.begin(title, self.selection.texels() as u64, Counted::Items("texels"));
+        let passing = self.selection.slots_of(&(0..blocks)).len();
+        context.progress.begin(title, passing as u64, Counted::Items("texels"));
         let mut stream = Stream::new(&self.measurement, &self.arrangement, &self.selection, 0);
-        stream.for_each(0..self.selection.blocks().len(), context, |block, read| {
+        stream.for_each(0..blocks, context, |block, read| {
             for (vector, number) in read.chunks_exact(stride).zip(self.selection.numbers(block.slots.clone()))
             {
                 if let Ok(at) = sample.binary_search(number) {

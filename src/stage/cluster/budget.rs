@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::stage::cluster::stream::Stream;
-use crate::stage::cluster::{Amount, Plan};
+use crate::stage::cluster::{Amount, First, Plan};
+use crate::texel::cluster::seeding;
 use crate::texel::cluster::tally::Tally;
 
 /// The program itself, and what allocators keep.
@@ -11,6 +12,9 @@ const PROGRAM_BYTES: usize = 64 << 20;
 
 /// Most bytes of the sample's vectors, unless told otherwise. Fixed, so that a result does not depend on memory.
 const SAMPLE_BYTES: usize = 192 << 20;
+
+/// Blocks' worth of memory that the allocator cannot give back for lying between blocks that are kept.
+const SCATTERED_BLOCKS: usize = 3;
 
 /// Texels whose distances to all centres a thread holds.
 const TABLE_TEXELS: usize = 64;
@@ -31,7 +35,12 @@ impl Plan {
     /// Texels of the sample.
     pub(super) fn sample_texels(&self) -> usize {
         let affordable = SAMPLE_BYTES / self.arrangement.stride();
-        self.options.sample.unwrap_or(affordable).max(self.least_sample()).min(self.selection.texels())
+        let least = self.least_sample();
+        let enough = match self.first {
+            First::Sample => affordable,
+            First::Minibatch => seeding::drawn_from(least).min(affordable),
+        };
+        self.options.sample.unwrap_or(enough).max(least).min(self.selection.texels())
     }
 
     /// No fewer texels than clusters that are asked for.
@@ -81,7 +90,7 @@ impl Budget {
             clusters,
             sample_columns: columns(&sample),
             columns: columns(&all),
-            kept_blocks: left / (block * plan.arrangement.stride()),
+            kept_blocks: (left / (block * plan.arrangement.stride())).saturating_sub(SCATTERED_BLOCKS),
         })
     }
 

@@ -86,6 +86,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         amount: Amount::Clusters(1),
         centre: options.centre,
         limits: options.limits,
+        first: None,
         sample: None,
         restarts: 1,
         seed: options.seed,

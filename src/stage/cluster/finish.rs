@@ -66,6 +66,7 @@ impl Plan {
         let report = Report {
             clusters,
             passes: history.passes.clone(),
+            batches: history.batches.clone(),
             ended: Ended::of(&history.passes, self.options.limits),
             sample_texels: history.sample_texels,
             sample_passes: history.sample_passes.clone(),

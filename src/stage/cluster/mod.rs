@@ -1,10 +1,11 @@
 //! Tile to clusters: index, centres, representatives and their distances.
 //!
-//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go passes over all
-//! texels ([`pass`]) that read each chunk once. What memory allows never changes a result: it only says how many bounds
+//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go
+//! passes over growing mini-batches ([`batches`]) and all texels ([`pass`]) that read each chunk once. What memory allows never changes a result: it only says how many bounds
 //! and blocks are kept.
 
 mod approach;
+mod batches;
 mod budget;
 pub mod curve;
 mod finish;
@@ -24,13 +25,14 @@ use crate::run::Context;
 use crate::stage::import::Shard;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
-use crate::store::passes::{Passes, State};
+use crate::store::passes::{BatchPass, Passes, State};
 use crate::texel::cluster::centre::CentreRule;
 use crate::texel::cluster::lloyd::{Limits, Method, Pass};
 use crate::texel::cluster::points::Arrangement;
 use crate::texel::cluster::search::Trial;
-use crate::texel::cluster::selection::Selection;
+use crate::texel::cluster::selection::{Order, Selection};
 use crate::texel::tile::Tile;
+pub use batches::First;
 use pass::{Next, Work};
 pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
 
@@ -76,8 +78,11 @@ pub struct Options {
     pub centre: CentreRule,
     /// When to stop.
     pub limits: Limits,
-    /// Texels that are clustered in memory: all of a tile of no more, a sample of a larger one. Where absent, as many as
-    /// 192 MiB hold.
+    /// Where first centres come from. Where absent, all texels of a tile of no more than a sample, else
+    /// [`First::Sample`].
+    pub first: Option<First>,
+    /// Texels that are clustered in memory: all of a tile of no more, a sample of a larger one or of the first
+    /// mini-batch. Where absent, as many as 192 MiB hold; of a mini-batch no more than first centres are drawn from.
     pub sample: Option<usize>,
     /// First centres are drawn so many times, and the best are taken.
     pub restarts: u32,
@@ -127,6 +132,9 @@ pub struct Report {
     pub passes: Vec<Pass>,
     /// Why there was no further pass.
     pub ended: Ended,
+    /// Passes over mini-batches that grew, before these.
+    #[serde(default)]
+    pub batches: Vec<BatchPass>,
     /// Texels of the sample that the first approach was made on; 0 where all texels went into memory.
     pub sample_texels: usize,
     /// Passes over the sample.
@@ -183,6 +191,7 @@ pub struct Plan {
     model: Model,
     tile: Tile,
     options: Options,
+    first: First,
     arrangement: Arrangement,
     selection: Selection,
     /// Clusters that are certain, or that a search may go up to.
@@ -248,7 +257,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         ))
         .hint("choose a smaller ratio"));
     }
-    let recipe = json!({
+    let mut recipe = json!({
         "stage": "cluster", "method": METHOD,
         "tile": tile_digest,
         "amount": options.amount,
@@ -258,10 +267,16 @@ pub fn plan(options: &Options) -> Result<Plan> {
         "restarts": options.restarts,
         "seed": options.seed,
     });
+    // Left out where it is not given, so that what was made before there was a choice counts as done.
+    if let Some(first) = options.first {
+        recipe["first"] = json!(first);
+    }
+    let first = options.first.unwrap_or(First::Sample);
+    let order = if first == First::Sample { Order::Rows } else { Order::Drawn(options.seed) };
     let arrangement = Arrangement::new(&description.views, description.lights.len());
-    let selection = Selection::new(&tile.source, description.chunk_side());
+    let selection = Selection::new(&tile.source, description.chunk_side(), order);
     let options = options.clone();
-    Ok(Plan { measurement, model, tile, options, arrangement, selection, most_clusters, recipe })
+    Ok(Plan { measurement, model, tile, options, first, arrangement, selection, most_clusters, recipe })
 }
 
 /// The most clusters whose BRDFs and index are together `ratio` times smaller than `raw` bytes.
@@ -282,9 +297,17 @@ impl Plan {
             "sample_texels": self.sample_texels(),
             "in_memory": self.fits_the_sample(),
             "unit": "part",
-            "units": self.selection.parts().len(),
+            "units": self.selection.parts(self.selection.blocks().len()).len(),
             "recipe": self.recipe,
         })
+    }
+
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Cluster, &self.recipe)
     }
 
     fn method(&self, columns: usize, deadline: Option<Instant>) -> Method {

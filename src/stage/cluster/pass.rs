@@ -1,4 +1,4 @@
-//! A pass over all texels: assigned, counted and forgotten, block by block; then summed up.
+//! A pass over all texels or a mini-batch: assigned, counted and forgotten, block by block; then summed up.
 
 use std::ops::Range;
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, Plan, Report, Stepped};
 use crate::stage::import::Shard;
-use crate::store::passes::{Found, History, Passes, State};
+use crate::store::passes::{BatchPass, Found, History, Passes, State};
 use crate::texel::cluster::assign::{Assignment, Texels};
 use crate::texel::cluster::bounds::{Centres, Columns, Guide, Steps};
 use crate::texel::cluster::lloyd::{self, Pass};
@@ -35,7 +35,7 @@ pub(super) struct Work<'a> {
     plan: &'a Plan,
     stream: Stream<'a>,
     columns_allowed: usize,
-    /// Bounds [slot, column], and what they were made by.
+    /// Bounds [slot, column] of the slots that the last pass went over, and what they were made by.
     bounds: Option<Bounds>,
     /// What the last pass took.
     pass_time: Option<Duration>,
@@ -70,13 +70,13 @@ impl<'a> Work<'a> {
         deadline: Option<Instant>,
         context: &Context<'_>,
     ) -> Result<Next> {
-        let number = state.history.passes.len() + 1;
-        let texels = self.plan.selection.texels();
-        context.progress.begin(&format!("pass {number}"), texels as u64, Counted::Items("texels"));
+        let blocks = 0..self.plan.blocks_of(&state.history)?;
+        let texels = self.plan.selection.slots_of(&blocks).len();
+        context.progress.begin(&title(&state.history), texels as u64, Counted::Items("texels"));
         lloyd::tell(&state.history.passes, self.plan.options.limits, self.pass_time, context);
         let start = Instant::now();
-        let found = self.assign(0..self.plan.selection.blocks().len(), state, context)?;
-        self.pass_time = Some(start.elapsed());
+        let found = self.assign(blocks, state, context)?;
+        self.pass_time = state.history.batch.is_none().then(|| start.elapsed());
         context.progress.end();
         self.plan.follow(passes, pass, state, found, deadline, context)
     }
@@ -94,34 +94,40 @@ impl<'a> Work<'a> {
             Some(bounds) => bounds,
             None => {
                 let columns = context.install(|| Columns::new(&now, self.columns_allowed));
-                let values = vec![0; slots.len() * columns.count()];
-                Bounds { columns, values, centres: Vec::new(), nearest: Vec::new() }
+                Bounds { columns, values: Vec::new(), centres: Vec::new(), nearest: Vec::new() }
             }
         };
-        // Bounds of nothing yet are of no use; the first pass computes all distances.
-        let guide = (!bounds.centres.is_empty()).then(|| {
-            context.install(|| Guide::new(&now, &bounds.columns, steps, &bounds.centres, &bounds.nearest))
+        let columns = bounds.columns.count();
+        // Of texels that the last pass did not go over there are no bounds yet: all their distances are computed.
+        let bounded = bounds.values.len() / columns;
+        let fresh = Assignment { centres: now, columns: &bounds.columns, steps, guide: None };
+        let guided = (bounded > 0).then(|| {
+            let guide = context
+                .install(|| Guide::new(&now, &bounds.columns, steps, &bounds.centres, &bounds.nearest));
+            Assignment { guide: Some(guide), ..fresh }
         });
-        let assignment = Assignment { centres: now, columns: &bounds.columns, steps, guide };
         let clusters = now.count();
-        let known = !state.index.is_empty();
+        let known = state.index.get(slots.start..).unwrap_or_default();
+        let known = &known[..known.len().min(slots.len())];
         let mut found = Found {
-            index: if known { state.index[slots.clone()].to_vec() } else { vec![0; slots.len()] },
+            index: known.to_vec(),
             tally: Tally::new(rule, clusters, arrangement.stride()),
             nearest: vec![Near::NONE; clusters],
             farthest: Farthest::default(),
-            objective: 0,
-            moved: 0,
+            distances: vec![0; clusters],
+            moved: slots.len() - known.len(),
         };
-        let columns = bounds.columns.count();
+        found.index.resize(slots.len(), 0);
         let values = &mut bounds.values;
+        values.reserve_exact(slots.len() * columns - values.len());
+        values.resize(slots.len() * columns, 0);
         let mut distances = Vec::new();
         self.stream.for_each(blocks, context, |block, vectors| {
             let here = block.slots.start - slots.start..block.slots.end - slots.start;
             let numbers = selection.numbers(block.slots.clone());
             let index = &mut found.index[here.clone()];
-            let before = index.to_vec();
             distances.resize(index.len(), 0);
+            let assignment = guided.as_ref().filter(|_| here.end <= bounded).unwrap_or(&fresh);
             let nearest = assignment.assign(&mut Texels {
                 vectors,
                 numbers,
@@ -131,9 +137,11 @@ impl<'a> Work<'a> {
             });
             found.tally.add(&centres, vectors, index, kernel);
             found.nearest = nearer(std::mem::take(&mut found.nearest), nearest);
-            found.objective += distances.iter().sum::<u64>();
-            found.moved +=
-                before.iter().zip(index.iter()).filter(|(before, now)| !known || before != now).count();
+            for (&cluster, distance) in index.iter().zip(&distances) {
+                found.distances[usize::from(cluster)] += distance;
+            }
+            let before = known.get(here.start..).unwrap_or_default();
+            found.moved += before.iter().zip(index.iter()).filter(|(before, now)| before != now).count();
             let texels = distances.iter().zip(numbers);
             found.farthest.add(texels.map(|(&distance, &texel)| Near { distance, texel }));
             Ok(())
@@ -166,6 +174,14 @@ impl Work<'_> {
     }
 }
 
+/// What a pass goes over.
+fn title(history: &History) -> String {
+    match history.batch {
+        Some(_) => format!("mini-batch pass {}", history.batches.len() + 1),
+        None => format!("pass {}", history.passes.len() + 1),
+    }
+}
+
 impl Plan {
     /// Assigns a shard's parts of a pass.
     pub(super) fn assign_shard(
@@ -176,11 +192,10 @@ impl Plan {
         context: &Context<'_>,
     ) -> Result<Stepped> {
         let state = passes.state(pass, self.brdf(), self.selection.texels())?;
-        let parts: Vec<_> =
-            self.selection.parts().iter().enumerate().filter(|&(part, _)| shard.has(part)).collect();
+        let parts = self.selection.parts(self.blocks_of(&state.history)?);
+        let parts: Vec<_> = parts.iter().enumerate().filter(|&(part, _)| shard.has(part)).collect();
         let texels: usize = parts.iter().map(|(_, blocks)| self.selection.slots_of(blocks).len()).sum();
-        let title = format!("pass {}", state.history.passes.len() + 1);
-        context.progress.begin(&title, texels as u64, Counted::Items("texels"));
+        context.progress.begin(&title(&state.history), texels as u64, Counted::Items("texels"));
         let (mut found, mut written) = (0, 0);
         for (part, blocks) in parts {
             if passes.has_part(pass, part)? {
@@ -203,7 +218,8 @@ impl Plan {
         let state = passes.state(pass, self.brdf(), self.selection.texels())?;
         let stride = self.arrangement.stride();
         let mut whole: Option<Found> = None;
-        for (part, blocks) in self.selection.parts().iter().enumerate() {
+        let parts = self.selection.parts(self.blocks_of(&state.history)?);
+        for (part, blocks) in parts.iter().enumerate() {
             context.check_stop()?;
             let slots = self.selection.slots_of(blocks).len();
             let found = passes.part(pass, part, slots, self.options.centre, stride)?;
@@ -237,11 +253,15 @@ impl Plan {
     ) -> Result<Next> {
         let empty = found.tally.empty_clusters();
         let reseeded = empty.len().min(found.farthest.texels().len());
-        let texels = self.selection.texels();
+        let texels = found.index.len();
         let mut history = state.history.clone();
-        history.passes.push(Pass::new(&self.arrangement, texels, found.objective, found.moved, reseeded));
+        let this = Pass::new(&self.arrangement, texels, found.objective(), found.moved, reseeded);
+        match history.batch {
+            Some(_) => history.batches.push(BatchPass { texels, pass: this }),
+            None => history.passes.push(this),
+        }
         let mut centres = self.arrangement.arranged(&state.centres);
-        if self.method(0, deadline).is_done(&history.passes) {
+        if history.batch.is_none() && self.method(0, deadline).is_done(&history.passes) {
             let error = history.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
             let clusters = found.nearest.len();
             let too_large = matches!(self.options.amount, Amount::Error(target) if error > target);
@@ -262,6 +282,9 @@ impl Plan {
         let vectors = self.read_vectors(&farthest, context)?;
         for (cluster, vector) in empty.into_iter().zip(vectors.chunks_exact(stride)) {
             centres[cluster * stride..(cluster + 1) * stride].copy_from_slice(vector);
+        }
+        if let Some(blocks) = history.batch {
+            history.batch = self.next_batch(blocks, &history, &found, &state.centres, &centres, deadline);
         }
         let next = State { centres: self.arrangement.plain(&centres), index: found.index, history };
         passes.write_state(pass + 1, self.brdf(), &next)?;

@@ -38,9 +38,10 @@ impl<'a> Stream<'a> {
     /// Most bytes in flight: a block at work, the next one, and the views that it is put together from.
     pub(super) fn bytes_in_flight(selection: &Selection, arrangement: &Arrangement) -> usize {
         let texels = selection.blocks().iter().map(|block| block.slots.len()).max().unwrap_or(0);
-        let window = selection.blocks().iter().map(|block| block.window.size.texels()).max().unwrap_or(0);
+        let windows = |block: &Block| block.windows.iter().map(|window| window.size.texels()).sum();
+        let windows: usize = selection.blocks().iter().map(windows).max().unwrap_or(0);
         read_ahead::IN_FLIGHT * texels * arrangement.stride()
-            + window * arrangement.cosines().len() * arrangement.lights()
+            + windows * arrangement.cosines().len() * arrangement.lights()
     }
 
     /// Calls `work` with each block of `blocks` and its vectors [slot, stride], in their order, on the pool.
@@ -83,7 +84,7 @@ fn read(
 ) -> Result<Vec<u8>> {
     let views: Vec<Vec<u8>> = (0..arrangement.cosines().len())
         .into_par_iter()
-        .map(|view| measurement.read_luminance(view, block.window))
+        .map(|view| measurement.read_luminance_of(view, &block.windows))
         .collect::<Result<_>>()?;
     let stride = arrangement.stride();
     let places = selection.places(block.slots.clone());

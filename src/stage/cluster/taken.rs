@@ -50,6 +50,14 @@ impl Plan {
         json!({"stage": "cluster", "model": self.model.path(), "clusters_of": self.from.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Cluster, &self.recipe)
+    }
+
     /// Takes the clusters, unless that is done.
     ///
     /// # Errors

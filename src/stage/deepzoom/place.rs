@@ -109,7 +109,7 @@ impl Place {
         let path = self.folder.join(STATE);
         let Some(state) = metadata::read_object(&path)? else { return Ok(None) };
         // The oldest had neither version nor seal.
-        let checked = if state.contains_key("format") {
+        let checked = if state.contains_key("format") || state.contains_key("seal") {
             metadata::check_ours(&state, true)
         } else {
             metadata::check_digest(&state)

@@ -8,7 +8,9 @@ use crate::coherent::{Plane, Variation};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::run::Context;
+use crate::stage::image::of_stage;
 use crate::store::enlarged::Method;
+use crate::store::model::{Model, Stage};
 
 /// Settings of the coherent rule.
 #[derive(Clone, Debug)]
@@ -31,7 +33,7 @@ pub(super) struct Coherent {
 
 impl Coherent {
     pub(super) fn open(subject: &Subject, options: &Options) -> Result<Self> {
-        let appearance = subject.model.appearance()?;
+        let appearance = of_stage(&subject.model, Stage::Appearance, Model::appearance)?;
         let kept = Kept { source: options.keep_source, normals: options.keep_normals };
         let tile = Tile::open(subject, kept)?;
         let plane = Plane::new(subject.tile, tile.index(), &appearance, Kernel::fastest())?;

@@ -17,6 +17,10 @@ use crate::store::enlarge_state::EnlargeState;
 use crate::store::enlarged::{Description, Enlarged, Method, SHARD_SIDE, Texels};
 use crate::texel::nearest::NearestNormals;
 use crate::texel::scan::Scan;
+use crate::words::counted;
+
+/// Candidates unless their number is given.
+const CANDIDATES: usize = 16;
 
 /// Bytes of a band of normals and candidates, unless its rows are given. Small, so that the stations of the pipeline
 /// are soon all at work, and a band is still in a cache when the next station takes it.
@@ -28,8 +32,8 @@ const BANDS: usize = 3;
 /// Settings of the paper's rule.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Number of nearest normals that are candidates, n_k.
-    pub candidates: usize,
+    /// Number of nearest normals that are candidates, n_k; where absent, [`CANDIDATES`], or all of a smaller tile.
+    pub candidates: Option<usize>,
     /// Write the synthesised normals too.
     pub keep_normals: bool,
     /// Rows whose candidates are sought at a time; as many as fit 2 MiB where absent. Changes no byte.
@@ -39,6 +43,7 @@ pub struct Options {
 /// The paper's rule on a model.
 pub(super) struct Paper {
     options: Options,
+    candidates: usize,
     surface: Surface,
     /// Bytes that the field takes.
     field_bytes: u64,
@@ -53,11 +58,12 @@ struct Shared {
 
 impl Paper {
     pub(super) fn open(subject: &Subject, options: &Options) -> Result<Self> {
-        if !(1..=subject.tile.texels()).contains(&options.candidates) {
+        let texels = subject.tile.texels();
+        let candidates = options.candidates.unwrap_or(CANDIDATES.min(texels));
+        if !(1..=texels).contains(&candidates) {
             return Err(Error::usage(format!(
-                "{} candidates were asked for, expected 1 to {} for this tile",
-                options.candidates,
-                subject.tile.texels()
+                "got --candidates {candidates}, expected 1 to {texels} for a tile of {}",
+                counted(texels, "texel")
             )));
         }
         if subject.options.shard != Shard::WHOLE {
@@ -69,11 +75,11 @@ impl Paper {
         let surface = subject.model.surface()?;
         let Size { height, width } = subject.options.size;
         let field_bytes = Synthesis::memory_bytes(&surface.field, height, width, extent(subject))?;
-        Ok(Self { options: options.clone(), surface, field_bytes })
+        Ok(Self { options: options.clone(), candidates, surface, field_bytes })
     }
 
     fn band_rows(&self, width: usize) -> usize {
-        let row_bytes = Band::row_bytes(width, self.options.candidates);
+        let row_bytes = Band::row_bytes(width, self.candidates);
         self.options.band_rows.unwrap_or(BAND_BYTES / row_bytes).clamp(1, SHARD_SIDE)
     }
 
@@ -85,7 +91,7 @@ impl Paper {
         shared: &Shared,
         context: &Context<'_>,
     ) -> Result<Units> {
-        let Options { candidates, keep_normals, .. } = self.options;
+        let (candidates, keep_normals) = (self.candidates, self.options.keep_normals);
         let super::Options { size, tileable, .. } = subject.options;
         let Size { height, width } = size;
         let digest = recipe::digest(&output.recipe);
@@ -163,14 +169,14 @@ impl Rule for Paper {
     }
 
     fn recipe(&self) -> Map<String, Value> {
-        let Options { candidates, keep_normals, .. } = self.options;
+        let (candidates, keep_normals) = (self.candidates, self.options.keep_normals);
         let settings = [("candidates", json!(candidates)), ("keep_normals", json!(keep_normals))];
         settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
     /// Bands, a row of shards, the field, and what belongs to the tile.
     fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
-        let Options { candidates, keep_normals, .. } = self.options;
+        let (candidates, keep_normals) = (self.candidates, self.options.keep_normals);
         let Size { height, width } = subject.options.size;
         let bands = BANDS * self.band_rows(width) * Band::row_bytes(width, candidates);
         let texel_bytes = size_of::<u16>() + if keep_normals { size_of::<[f32; 3]>() } else { 0 };
@@ -189,7 +195,7 @@ impl Rule for Paper {
         let kernel = Kernel::fastest();
         let normals = subject.model.normals()?;
         let shared = Shared {
-            nearest: context.compute(|| NearestNormals::new(&normals, self.options.candidates, kernel)),
+            nearest: context.compute(|| NearestNormals::new(&normals, self.candidates, kernel)),
             scan: Scan::new(subject.model.index()?, &subject.model.distance()?),
             kernel,
         };

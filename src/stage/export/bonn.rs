@@ -9,7 +9,7 @@ use super::{Options, Written, for_each_view, linear};
 use crate::error::{Error, Result};
 use crate::factor::{self, Block, Factors, Identity, Size, identity_rows};
 use crate::run::Context;
-use crate::run::progress::Counted;
+use crate::run::progress::{Counted, Stage};
 use crate::shape::Window;
 use crate::store::measurement::Measurement;
 use crate::store::output;
@@ -202,9 +202,20 @@ fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Conte
     let description = measurement.description();
     let part_channels = part.channels(description.n_channels()).len();
     let size = matrix_size(measurement, part_channels);
+    if rank > size.full_rank() {
+        return Err(Error::usage(format!("got --rank {rank}, the rank is at most {}", size.full_rank())));
+    }
     let options = factor::Options::default();
     let rows = description.lights.len() * part_channels;
+    // Every pass reads the measurement once; of several channels, each has its passes.
+    let (before, parts) = match part {
+        Part::Channel(channel) => (channel * options.passes(), description.n_channels()),
+        Part::All => (0, 1),
+    };
+    let (mut number, of) = (before, parts * options.passes());
     let factors = factor::truncated(size, rank, &options, |visit| {
+        number += 1;
+        context.progress.stage(Some(Stage { number, of, name: "factorise" }));
         for_each_view(measurement, context, |view, images| {
             let images = linear(&images, description.transfer);
             let values: Vec<f32> =
@@ -212,8 +223,6 @@ fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Conte
             visit(Block { rows: view * rows..(view + 1) * rows, columns: 0..size.columns, values: &values })
         })
     })?;
-    if factors.rank < rank {
-        return Err(Error::usage(format!("the rank is at most {}", factors.rank)));
-    }
+    context.progress.stage(None);
     Ok(factors)
 }

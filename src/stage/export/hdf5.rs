@@ -30,7 +30,7 @@ pub(super) fn write(measurement: &Measurement, options: &Options, context: &Cont
     let whole = description.size.window();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     let codes = (description.size.texels() * description.lights.len()) as u64;
-    let in_flight = read_ahead::in_flight(context.memory_bytes, description.view_bytes() + codes);
+    let in_flight = read_ahead::in_flight(context.work_bytes(), description.view_bytes() + codes);
     let read = |view| {
         let samples = measurement.read_reflectance(view, whole)?;
         Ok((view, samples, measurement.read_luminance(view, whole)?))

@@ -19,6 +19,9 @@ use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
 use crate::store::output::Made;
 
+/// A view as it is read, turned into images, and encoded.
+const VIEW_COPIES: u64 = 4;
+
 /// What to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -76,6 +79,9 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         let found = format!("{}: {done} of {views} views are there", measurement.path().display());
         return Err(Error::missing(found).hint("finish its import first"));
     }
+    let description = measurement.description();
+    let what = format!("exporting views of {} under {} lights", description.size, description.lights.len());
+    context.require(&what, VIEW_COPIES * description.view_bytes())?;
     let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
         Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,
@@ -115,7 +121,7 @@ fn for_each_view(
     let description = measurement.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     // Read as texels, then turned.
-    let in_flight = read_ahead::in_flight(context.memory_bytes, 2 * description.view_bytes());
+    let in_flight = read_ahead::in_flight(context.work_bytes(), 2 * description.view_bytes());
     let read = |view| {
         let texels = measurement.read_reflectance(view, description.size.window())?;
         Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))

@@ -17,6 +17,12 @@ use crate::store::field::FieldReport;
 use crate::store::model::{Model, Stage};
 use crate::texel::tile::Tile;
 
+/// Memory of a texel of the tile: the pyramids, their moments, and a synthesis for each number of levels (measured).
+const TEXEL_BYTES: u64 = 2300;
+
+/// Memory of what does not grow with the tile (measured).
+const FIXED_BYTES: u64 = 16 << 20;
+
 /// How to fit.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -77,6 +83,14 @@ impl Plan {
         json!({"stage": "fit", "model": self.model.path(), "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        self.model.is_done(Stage::Fit, &self.recipe)
+    }
+
     /// Fits the field, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
         let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe, context)? else {
@@ -84,6 +98,8 @@ impl Plan {
         };
         context.progress.begin("fit", 1, Counted::Items("field"));
         let tile = self.model.tile()?;
+        let needed = FIXED_BYTES + TEXEL_BYTES * tile.size.texels() as u64;
+        context.require(&format!("fitting the field of a tile of {}", tile.size), needed)?;
         let normals = self.model.normals()?;
         let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
         let boundary = boundary_of(&tile);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
-use crate::picture::{Ending, Picture, stream};
+use crate::picture::{Encoding, Picture, stream};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
@@ -20,7 +20,7 @@ use crate::texel::triangulation::{Interpolator, triangulate};
 use btfkit_formats::Direction;
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
-pub(crate) use scene::{model_of, plane_rows};
+pub(crate) use scene::{model_of, of_stage, plane_rows};
 
 /// Memory for what does not grow with a picture: the program itself, packers, buffers.
 const WRITING_BYTES: u64 = 16 << 20;
@@ -77,24 +77,35 @@ pub struct PlaneOptions {
     pub jitter: Option<u32>,
 }
 
-/// Writes the picture as a PNG or an EXR file, by the ending of its name: row by row, in memory that grows
-/// with its width only. Returns its size, and whether it was there already.
+/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size, and whether
+/// it was there already.
 ///
 /// # Errors
-/// A window that does not lie within the plane, an ending that is not known, and those of reading and writing.
-pub fn run(options: &Options, exposure: f64, output: &Path, context: &Context<'_>) -> Result<(Size, Made)> {
-    Ending::of(output)?;
+/// A window that does not lie within the plane, a size that the format or the memory does not hold, and those of
+/// reading and writing.
+pub fn run(
+    options: &Options,
+    exposure: f64,
+    output: &Path,
+    encoding: Encoding,
+    context: &Context<'_>,
+) -> Result<(Size, Made)> {
+    let fits = |size: Size| {
+        encoding.check_size(size)?;
+        encoding.check_memory(size, WRITING_BYTES, context.memory_bytes)
+    };
+    options.window.map_or(Ok(()), |window| fits(window.size))?;
     let mut scene = Scene::open(options, context)?;
     scene.expose(exposure);
     let size = scene.size();
-    // Rows as values, bytes and packed bytes, and the file's buffers.
-    let writing = 32 * size.width as u64 + WRITING_BYTES;
+    fits(size)?;
+    let writing = encoding.memory_bytes(size) + WRITING_BYTES;
     let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
-        stream::write(output, size, scene.meaning(), context.existing, |pixels| {
+        stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
             context.progress.advance(1);
             Ok(())

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::coherent::{Plane, Variation};
 use crate::color::Decoder;
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::kernel::Kernel;
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
@@ -22,6 +22,7 @@ use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
+use crate::store::model_place;
 
 /// Rows of a measurement that are decoded together: a row of chunks.
 pub(super) const MEASUREMENT_ROWS: usize = 16;
@@ -328,16 +329,25 @@ fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Resu
     let tile = model.tile()?;
     match (options.subject, &options.values) {
         (Subject::Appearance { view, light }, Values::Model) => {
-            look_up(tile.size, &model.index()?, &cluster_colors(model, view, light)?)
+            let colors = of_stage(model, Stage::Cluster, |model| cluster_colors(model, view, light))?;
+            look_up(tile.size, &of_stage(model, Stage::Cluster, Model::index)?, &colors)
         }
         (Subject::Appearance { view, light }, Values::Measured(path)) => {
-            let path = path.clone().unwrap_or_else(|| measurement_beside(model.path()));
-            let measurement = open_measurement_of(model, &path)
-                .map_err(|error| error.hint("name the measurement with --measurement"))?;
+            let place = path.clone().unwrap_or_else(|| measurement_beside(model.path()));
+            let measurement = open_measurement_of(model, &place).map_err(|error| {
+                error.hint(match path {
+                    None => "name the measurement with --measurement",
+                    Some(_) => "--measurement names the measurement that the model was made of",
+                })
+            })?;
             of_measured_tile(&measurement, &tile, view, light, context)
         }
-        (Subject::Index, _) => Ok(false_color::index(tile.size, &model.index()?)),
-        (Subject::Normals, _) => Ok(false_color::normals(tile.size, &model.normals()?)),
+        (Subject::Index, _) => {
+            Ok(false_color::index(tile.size, &of_stage(model, Stage::Cluster, Model::index)?))
+        }
+        (Subject::Normals, _) => {
+            Ok(false_color::normals(tile.size, &of_stage(model, Stage::Normals, Model::normals)?))
+        }
     }
 }
 
@@ -353,8 +363,9 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         Error::usage("an endless plane has no size of its own: say which part with --window x,y,width,height")
     })?;
     let tile = tile_picture(model, options, context)?;
-    let appearance = model.appearance()?;
-    let plane = context.compute(|| Plane::new(tile.size, &model.index()?, &appearance, Kernel::fastest()))?;
+    let appearance = of_stage(model, Stage::Appearance, Model::appearance)?;
+    let index = of_stage(model, Stage::Cluster, Model::index)?;
+    let plane = context.compute(|| Plane::new(tile.size, &index, &appearance, Kernel::fastest()))?;
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
@@ -402,25 +413,50 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
     Ok((source, size))
 }
 
-/// The model that an enlarged index at a path refers to; where it is not named, it lies beside it.
+/// The model that an enlarged index at a path refers to; where it is not named, it is looked for where it lay when the
+/// index was made, as seen from the index, and beside it.
 pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) -> Result<Model> {
-    let path = match named {
-        Some(path) => path.to_owned(),
-        None => beside(place, enlarged.model_name().unwrap_or_default()),
-    };
-    let model = Model::open(&path).map_err(|error| error.hint("name the model with --model"))?;
-    if enlarged.recipe().model != model.digest_of(enlarged.method().stages())? {
-        return Err(Error::recipe(format!(
+    let stages = enlarged.method().stages();
+    let open = |path: &Path| {
+        let model = Model::open(path)?;
+        if enlarged.recipe().model == model.digest_of(stages)? {
+            return Ok(model);
+        }
+        Err(Error::recipe(format!(
             "{} was enlarged from another model than {}",
             place.display(),
             path.display()
-        )));
+        )))
+    };
+    if let Some(path) = named {
+        return open(path).map_err(|error| error.hint("--model names the model that it was enlarged from"));
     }
-    Ok(model)
+    let places = model_place::places(place, enlarged.model_name());
+    let mut failed = None;
+    for path in places.iter().filter(|path| path.exists()) {
+        match open(path) {
+            Ok(model) => return Ok(model),
+            Err(error) => drop(failed.get_or_insert(error)),
+        }
+    }
+    let error = failed.unwrap_or_else(|| {
+        let looked: Vec<String> = places.iter().map(|path| path.display().to_string()).collect();
+        Error::missing(format!(
+            "{}: the model that it was enlarged from is not there; looked for {}",
+            place.display(),
+            looked.join(" and ")
+        ))
+    });
+    Err(error.hint("name the model with --model"))
 }
 
-fn beside(path: &Path, name: &str) -> PathBuf {
-    // A trailing slash would make the store its own parent.
-    let path: PathBuf = path.components().collect();
-    path.with_file_name(name)
+/// Reads what a stage of a model left; where that is not there, the error says which command makes it.
+pub(crate) fn of_stage<T>(model: &Model, stage: Stage, read: impl FnOnce(&Model) -> Result<T>) -> Result<T> {
+    model.stage_digest(stage)?;
+    read(model).map_err(|error| match error.kind() {
+        Kind::Missing => {
+            error.hint(format!("run `btf {}` on the model: it makes again what is missing", stage.name()))
+        }
+        _ => error,
+    })
 }

@@ -73,7 +73,10 @@ pub(super) fn real_crops(plane: Size, used: Window, most: usize, wanted: Option<
         return Err(Error::input(format!(
             "a measurement of {plane} has no crops to judge by: expected at least {least}x{least}, four quadrants of it"
         ))
-        .hint("import a larger part of the material, or give a smaller --crop"));
+        .hint(match wanted {
+            Some(wanted) if wanted > LEAST_SIDE => "import a larger part of the material, or give a smaller --crop",
+            _ => "import a larger part of the material",
+        }));
     }
     let (bottom, right) = (plane.height - side, plane.width - side);
     let window = |(y, x)| Window { y, x, size: Size::new(side, side) };

@@ -8,10 +8,10 @@ use crate::coherent::{Plane, Variation};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::shape::{Area, Size, Window};
-use crate::stage::image::{model_of, plane_rows};
+use crate::stage::image::{model_of, of_stage, plane_rows};
 use crate::store::Store;
 use crate::store::enlarged::{self, CHUNK_SIDE, Enlarged};
-use crate::store::model::{self, Model};
+use crate::store::model::{self, Model, Stage};
 
 /// Rows and columns of a plane that are made at once.
 const PLANE_SIDE: usize = 512;
@@ -52,8 +52,9 @@ impl Subject {
             ))),
             (model::KIND, Some(size)) => {
                 let model = Model::open(path)?;
-                let (tile, index) = (model.tile()?, model.index()?);
-                let plane = Plane::new(tile.size, &index, &model.appearance()?, Kernel::fastest())?;
+                let (tile, index) = (model.tile()?, of_stage(&model, Stage::Cluster, Model::index)?);
+                let appearance = of_stage(&model, Stage::Appearance, Model::appearance)?;
+                let plane = Plane::new(tile.size, &index, &appearance, Kernel::fastest())?;
                 let variation = plane.variation(SEED);
                 Ok((Self::Plane { plane: Box::new(plane), variation, index, size }, model))
             }

@@ -21,6 +21,10 @@ pub use crate::store::tile_report::TileReport as Report;
 use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use features::lattice_of;
 
+/// Memory of a texel of the plane: its codes under some directions, their components, and the transforms in which a
+/// lattice is looked for (measured).
+const TEXEL_BYTES: u64 = 290;
+
 /// How to cut a tile.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -97,6 +101,17 @@ impl Plan {
         json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
     }
 
+    /// Whether a run would find it done.
+    ///
+    /// # Errors
+    /// Where it has been run by another recipe.
+    pub fn is_done(&self) -> Result<bool> {
+        if !self.model.join("zarr.json").exists() {
+            return Ok(false);
+        }
+        Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe)
+    }
+
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let model = Model::create(&self.model, context)?;
@@ -105,6 +120,8 @@ impl Plan {
         };
         let description = self.measurement.description();
         let plane = description.size;
+        let needed = plane.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64);
+        context.require(&format!("choosing a tile from a plane of {plane}"), needed)?;
         let features = features(&self.measurement, context)?;
         let (tile, patch, lattice) = context.compute(|| self.tile(&features))?;
         let report = Report {

@@ -414,6 +414,7 @@ mod tests {
     use crate::color::{LightnessCodes, Transfer};
     use crate::random::Hash;
     use crate::store::gather::{Images, images_of_texels};
+    use btfkit_formats::Direction;
     use btfkit_formats::f16;
 
     fn description(size: Size, sample_type: SampleType) -> Description {

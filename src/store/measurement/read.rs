@@ -1,6 +1,7 @@
 //! Reading a window of one view: the chunks that it touches, decoded by many threads straight from the mapped
 //! shards, and cut to the window.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
 
@@ -26,7 +27,7 @@ impl Measurement {
     /// # Errors
     /// [`crate::Kind::Missing`] where a shard of it has not been written, [`crate::Kind::Input`] where one is damaged.
     pub fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
-        let bytes = self.read_window(SampleArray::Reflectance, self.description.chunk(), view, window)?;
+        let bytes = self.read_windows(SampleArray::Reflectance, self.description.chunk(), view, &[window])?;
         Ok(match self.description.sample_type {
             SampleType::U8 => Samples::U8(bytes),
             SampleType::U16 => Samples::U16(cast(&bytes)),
@@ -40,12 +41,27 @@ impl Measurement {
     /// # Errors
     /// As [`Measurement::read_reflectance`].
     pub fn read_luminance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
-        self.read_window(SampleArray::Luminance, self.description.code_chunk(), view, window)
+        self.read_luminance_of(view, &[window])
     }
 
-    /// Bytes of a window of an array, texel by texel.
-    fn read_window(&self, array: SampleArray, chunk: Chunk, view: usize, window: Window) -> Result<Vec<u8>> {
-        if view >= self.description.views.len() || !window.fits(self.description.size) {
+    /// L* codes of some windows under one view, one window after another, each [y, x, light].
+    ///
+    /// # Errors
+    /// As [`Measurement::read_reflectance`].
+    pub fn read_luminance_of(&self, view: usize, windows: &[Window]) -> Result<Vec<u8>> {
+        self.read_windows(SampleArray::Luminance, self.description.code_chunk(), view, windows)
+    }
+
+    /// Bytes of some windows of an array, texel by texel; a shard that several lie in is opened once.
+    fn read_windows(
+        &self,
+        array: SampleArray,
+        chunk: Chunk,
+        view: usize,
+        windows: &[Window],
+    ) -> Result<Vec<u8>> {
+        let beyond = windows.iter().find(|window| !window.fits(self.description.size));
+        if let Some(window) = beyond.or(windows.first().filter(|_| view >= self.description.views.len())) {
             return Err(Error::input(format!(
                 "{}: asked for {window} of view {view}, there are {} views of {}",
                 self.path().display(),
@@ -54,42 +70,45 @@ impl Measurement {
             )));
         }
         let texel_bytes = chunk.bytes() / (CHUNK_SIDE * CHUNK_SIDE);
-        let row_bytes = window.size.width * texel_bytes;
         // Opened first: what is not there is not made room for.
-        let shards = self.open_shards(array, view, window)?;
-        let mut bytes = vec![0; window.size.height * row_bytes];
-        // Bands of the window that lie in one row of chunks each; every band is one thread's.
+        let shards = self.open_shards(array, view, windows)?;
+        let texels: usize = windows.iter().map(|window| window.size.texels()).sum();
+        let mut bytes = vec![0; texels * texel_bytes];
+        // Bands of the windows that lie in one row of chunks each; every band is one thread's.
         let mut bands = Vec::new();
-        let (mut rest, mut y) = (bytes.as_mut_slice(), window.y);
-        while y < window.y + window.size.height {
-            let end = ((y / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.y + window.size.height);
-            let (band, later) = rest.split_at_mut((end - y) * row_bytes);
-            bands.push((y..end, band));
-            (rest, y) = (later, end);
+        let mut rest = bytes.as_mut_slice();
+        for window in windows {
+            let mut y = window.y;
+            while y < window.y + window.size.height {
+                let end = ((y / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.y + window.size.height);
+                let (band, later) = rest.split_at_mut((end - y) * window.size.width * texel_bytes);
+                bands.push((window, y..end, band));
+                (rest, y) = (later, end);
+            }
         }
-        let read_band =
-            |codec: &mut Option<(ChunkCodec, Vec<u8>)>, rows: Range<usize>, band: &mut [u8]| -> Result<()> {
-                let (codec, texels) = match codec {
-                    Some(codec) => codec,
-                    none => none.insert((ChunkCodec::new(self.codec, chunk)?, vec![0; chunk.bytes()])),
-                };
-                let mut x = window.x;
-                while x < window.x + window.size.width {
-                    let end = ((x / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.x + window.size.width);
-                    self.decode(&shards, array, view, [rows.start, x], codec, texels)?;
-                    let columns = (end - x) * texel_bytes;
-                    for (number, row) in rows.clone().enumerate() {
-                        let from = (row % CHUNK_SIDE * CHUNK_SIDE + x % CHUNK_SIDE) * texel_bytes;
-                        let to = number * row_bytes + (x - window.x) * texel_bytes;
-                        band[to..to + columns].copy_from_slice(&texels[from..from + columns]);
-                    }
-                    x = end;
-                }
-                Ok(())
+        let read_band = |codec: &mut Option<(ChunkCodec, Vec<u8>)>,
+                         (window, rows, band): (&Window, Range<usize>, &mut [u8])|
+         -> Result<()> {
+            let (codec, texels) = match codec {
+                Some(codec) => codec,
+                none => none.insert((ChunkCodec::new(self.codec, chunk)?, vec![0; chunk.bytes()])),
             };
-        bands
-            .into_par_iter()
-            .try_for_each_init(|| None, |codec, (rows, band)| read_band(codec, rows, band))?;
+            let row_bytes = window.size.width * texel_bytes;
+            let mut x = window.x;
+            while x < window.x + window.size.width {
+                let end = ((x / CHUNK_SIDE + 1) * CHUNK_SIDE).min(window.x + window.size.width);
+                self.decode(&shards, array, view, [rows.start, x], codec, texels)?;
+                let columns = (end - x) * texel_bytes;
+                for (number, row) in rows.clone().enumerate() {
+                    let from = (row % CHUNK_SIDE * CHUNK_SIDE + x % CHUNK_SIDE) * texel_bytes;
+                    let to = number * row_bytes + (x - window.x) * texel_bytes;
+                    band[to..to + columns].copy_from_slice(&texels[from..from + columns]);
+                }
+                x = end;
+            }
+            Ok(())
+        };
+        bands.into_par_iter().try_for_each_init(|| None, read_band)?;
         Ok(bytes)
     }
 
@@ -148,18 +167,25 @@ impl Measurement {
         }
     }
 
-    /// Maps the shards that a window touches.
+    /// Maps the shards that windows touch.
     fn open_shards(
         &self,
         array: SampleArray,
         view: usize,
-        window: Window,
+        windows: &[Window],
     ) -> Result<Vec<([usize; 2], Shard)>> {
         let places = |start: usize, length: usize| start / self.side..(start + length).div_ceil(self.side);
-        let columns = places(window.x, window.size.width);
         let across = self.side / CHUNK_SIDE;
-        places(window.y, window.size.height)
-            .flat_map(|sy| columns.clone().map(move |sx| [sy, sx]))
+        let touched: BTreeSet<[usize; 2]> = windows
+            .iter()
+            .flat_map(|window| {
+                let columns = places(window.x, window.size.width);
+                places(window.y, window.size.height)
+                    .flat_map(move |sy| columns.clone().map(move |sx| [sy, sx]))
+            })
+            .collect();
+        touched
+            .into_iter()
             .map(|[sy, sx]| {
                 let corner = Window { y: sy * self.side, x: sx * self.side, size: Size::new(1, 1) };
                 let path = self.shard_path(array, view, corner);

@@ -124,7 +124,7 @@ impl Centres<'_> {
     }
 
     /// Distance of each centre to where it was before.
-    fn drifts(&self, before: &[u8]) -> Vec<u64> {
+    pub fn drifts(&self, before: &[u8]) -> Vec<u64> {
         let stride = self.arrangement.stride();
         let pairs = self.vectors.par_chunks_exact(stride).zip(before.par_chunks_exact(stride));
         pairs

@@ -38,6 +38,11 @@ struct Candidate {
     gain: u64,
 }
 
+/// How many texels `count` first centres are drawn from.
+pub fn drawn_from(count: usize) -> usize {
+    TEXELS.max(TEXELS_OF_A_CENTRE * count)
+}
+
 /// Draws `count` texels as first centres; fewer where there are fewer distinct BRDFs. The first of them are those
 /// that a smaller `count` gives, as long as both are drawn from as many texels. Each `attempt` is another draw.
 pub fn draw(
@@ -49,7 +54,7 @@ pub fn draw(
     context: &Context<'_>,
 ) -> Result<Vec<u32>> {
     let hash = Hash::new(seed, u32::from_be_bytes(*b"seed"));
-    let texels = subset(points.len(), TEXELS.max(TEXELS_OF_A_CENTRE * count), seed, attempt);
+    let texels = subset(points.len(), drawn_from(count), seed, attempt);
     let first = hash.below(texels.len() as u64, 0, attempt, 0) as usize;
     let (mut chosen, mut vectors) = (Vec::new(), Vec::new());
     let mut own: Vec<Own> =

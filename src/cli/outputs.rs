@@ -1,0 +1,68 @@
+//! What the outputs of one or of many inputs are called, the same for every command that makes a store of a store.
+
+use std::path::{Path, PathBuf};
+
+use btfkit::error::{Error, Result};
+use btfkit::store::Store;
+
+/// An input and the output to make of it.
+pub(super) struct Pair {
+    pub(super) input: PathBuf,
+    pub(super) output: PathBuf,
+}
+
+/// How a command names what it makes.
+pub(super) struct Naming<'a> {
+    /// The kind of store that it reads.
+    pub(super) reads: &'static str,
+    /// How names of such stores end; a name with this ending is never an output.
+    pub(super) ending: Option<&'a str>,
+    /// What the ending of an input is exchanged for.
+    pub(super) becomes: &'a str,
+}
+
+impl Naming<'_> {
+    /// Pairs names from the command line. Of two names the second is the output, unless it is a store of the kind that
+    /// is read; of more, and with a folder to put outputs into, every name is an input.
+    ///
+    /// # Errors
+    /// Two inputs that would become one output.
+    pub(super) fn pairs(&self, names: &[PathBuf], into: Option<&Path>) -> Result<Vec<Pair>> {
+        if let ([input, output], None) = (names, into)
+            && !self.is_input(output)
+        {
+            return Ok(vec![Pair { input: input.clone(), output: output.clone() }]);
+        }
+        let pair = |input: &PathBuf| Pair { input: input.clone(), output: self.output(input, into) };
+        let pairs: Vec<Pair> = names.iter().map(pair).collect();
+        let mut outputs: Vec<&Path> = pairs.iter().map(|pair| pair.output.as_path()).collect();
+        outputs.sort();
+        match outputs.windows(2).find(|pair| pair[0] == pair[1]) {
+            None => Ok(pairs),
+            Some(pair) => Err(Error::usage(format!("two inputs would both become {}", pair[0].display()))
+                .hint("give them one by one and name the outputs")),
+        }
+    }
+
+    fn is_input(&self, name: &Path) -> bool {
+        let by_ending = self.ending.is_some_and(|ending| file_name(name).ends_with(ending));
+        by_ending || Store::at(name).expect_one_of(&[self.reads]).is_ok()
+    }
+
+    /// The output of an input: beside it, or in a folder.
+    fn output(&self, input: &Path, into: Option<&Path>) -> PathBuf {
+        let name = file_name(input);
+        let stem =
+            [self.ending, Some(".zarr")].into_iter().flatten().find_map(|ending| name.strip_suffix(ending));
+        let name = format!("{}{}", stem.unwrap_or(&name), self.becomes);
+        match into {
+            Some(folder) => folder.join(name),
+            // A trailing slash would make the input its own folder.
+            None => input.components().collect::<PathBuf>().with_file_name(name),
+        }
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

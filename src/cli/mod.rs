@@ -76,6 +76,7 @@ struct Cli {
 struct Common {
     /// Threads to use, from 1 to 1024 [default: all cores]
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_THREADS))]
+    #[arg(allow_negative_numbers = true)]
     threads: Option<u32>,
     /// Memory to use, such as 512MiB, 1.5GiB or 2GB
     #[arg(long, global = true, default_value = "2GiB", value_parser = bytes::parse_bytes, value_name = "SIZE")]

@@ -244,7 +244,7 @@ impl Whole {
         // A line may be told only while no bar is drawn.
         let told = |found: bool, told: &dyn Fn(Tell)| context.progress.pause(&mut || told(tell.found(found)));
         begin(Stage::Tile);
-        let found = plan.is_done()?;
+        let found = plan.is_done();
         let tile = plan.run(context)?;
         told(found, &|tell| tell_tile(&tile, tell));
         begin(Stage::Cluster);
@@ -252,11 +252,11 @@ impl Whole {
         told(found, &|tell| tell_clusters(&clusters, tell));
         begin(Stage::Normals);
         let plan = normals_plan(measurement, model, &self.normals)?;
-        let (found, normals) = (plan.is_done()?, plan.run(context)?);
+        let (found, normals) = (plan.is_done(), plan.run(context)?);
         told(found, &|tell| tell_normals(&normals, tell));
         begin(Stage::Fit);
         let plan = fit_plan(model, &self.fit)?;
-        let (found, field) = (plan.is_done()?, plan.run(context)?);
+        let (found, field) = (plan.is_done(), plan.run(context)?);
         told(found, &|tell| tell_field(&field, tell));
         begin(Stage::Appearance);
         let plan = appearance_plan(model, &self.tile.lattice)?;
@@ -307,7 +307,7 @@ impl Normals {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        let found = plan.is_done()?;
+        let found = plan.is_done();
         tell_normals(&plan.run(context)?, tell.found(found));
         Ok(())
     }
@@ -324,11 +324,11 @@ fn run_clusters(
     match &options.clusters_of {
         Some(from) => {
             let plan = taken_plan(model, from)?;
-            Ok((plan.is_done()?, plan.run(context)?))
+            Ok((plan.is_done(), plan.run(context)?))
         }
         None => {
             let plan = cluster_plan(measurement, model, options, seed)?;
-            Ok((plan.is_done()?, plan.run(context)?))
+            Ok((plan.is_done(), plan.run(context)?))
         }
     }
 }

@@ -88,7 +88,7 @@ impl Fit {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        let found = plan.is_done()?;
+        let found = plan.is_done();
         tell_field(&plan.run(context)?, tell.found(found));
         let Some(name) = &self.report else { return Ok(()) };
         let comparison = fit::compare(&self.model, context)?;

@@ -57,8 +57,9 @@ impl Import {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
         let jobs = self.jobs()?;
         let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, tell) };
-        if let Some((description, report)) = self.import(job, context, tell)? {
+        if let Some((description, report, remarks)) = self.import(job, context, tell)? {
             tell.line(format!("{}: {}", job.store.display(), told(&description, &report)));
+            remarks.iter().for_each(|remark| tell.line(format!("  {remark}")));
         }
         Ok(Ended::Done)
     }
@@ -104,8 +105,13 @@ impl Import {
         }
     }
 
-    /// Imports one archive; `None` after a dry run.
-    fn import(&self, job: &Job, context: &Context<'_>, tell: Tell) -> Result<Option<(Description, Report)>> {
+    /// Imports one archive; with what a user should know of it, a line each. `None` after a dry run.
+    fn import(
+        &self,
+        job: &Job,
+        context: &Context<'_>,
+        tell: Tell,
+    ) -> Result<Option<(Description, Report, Vec<String>)>> {
         let source = self.source.open(&job.pieces)?;
         let options = import::Options {
             store: job.store.clone(),
@@ -119,7 +125,9 @@ impl Import {
             return Ok(None);
         }
         let report = plan.run(context)?;
-        Ok(Some((plan.description().clone(), report)))
+        let assumed = source.contents().assumptions.iter().map(|text| format!("assumed: {text}"));
+        let remarks = source.notes().into_iter().chain(assumed).collect();
+        Ok(Some((plan.description().clone(), report, remarks)))
     }
 
     /// Imports many archives under one bar; those that fail do not stop the others.
@@ -141,7 +149,9 @@ impl Import {
         each(jobs, name, false, context, tell, |job| {
             context.progress.remark(&name(job));
             let report = self.import(job, &inner, tell)?;
-            let told = report.map(|(description, report)| told(&description, &report));
+            let told = report.map(|(description, report, remarks)| {
+                std::iter::once(told(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
+            });
             let store = job.store.display();
             Ok((Line::Text(told.map_or(format!("{store}"), |told| format!("{store}: {told}"))), None))
         })

@@ -28,9 +28,10 @@ mod tile;
 mod verify;
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use btfkit::error::{Error, Kind, Result};
@@ -55,6 +56,9 @@ Each command explains itself: btf import --help, or man btf-import (see btf man 
 
 Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input not there yet,
 74 input/output, 75 stopped early (run the same command again).";
+
+/// Why something could not be written to standard output: the program must not end as if it had been told.
+static UNTOLD: OnceLock<std::io::Error> = OnceLock::new();
 
 /// The version, and the commit that the program was built from.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"), ")");
@@ -170,6 +174,12 @@ pub(crate) fn run() -> ExitCode {
         .inspect(|context| obey_while_computing(&stop, context.computing()))
         .and_then(|context| cli.command.run(&context, tell));
     progress.end();
+    let result = result.and_then(|ended| match UNTOLD.get() {
+        Some(error) => {
+            Err(Error::io("write", Path::new("standard output"), std::io::Error::from(error.kind())))
+        }
+        None => Ok(ended),
+    });
     match result {
         Ok(Ended::Done) => ExitCode::SUCCESS,
         Ok(Ended::Failed(kind)) => ExitCode::from(exit_code(kind)),
@@ -285,8 +295,12 @@ impl Tell {
     /// A line that programs read: it is never wrapped.
     fn as_it_is(self, text: &str) {
         if !self.quiet {
-            // A closed pipe (`btf info x | head -1`) is no failure.
-            let _ = writeln!(std::io::stdout(), "{text}");
+            let mut output = std::io::stdout();
+            match writeln!(output, "{text}").and_then(|()| output.flush()) {
+                // A closed pipe (`btf info x | head -1`) is no failure.
+                Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => drop(UNTOLD.set(error)),
+                _ => {}
+            }
         }
     }
 

@@ -56,7 +56,7 @@ impl Tile {
         if self.dry_run {
             return tell.plan(&plan.summary());
         }
-        let found = plan.is_done()?;
+        let found = plan.is_done();
         tell_tile(&plan.run(context)?, tell.found(found));
         Ok(())
     }

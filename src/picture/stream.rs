@@ -12,7 +12,7 @@ use exr::meta::header::Header;
 use crate::error::{Error, Result};
 use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
 use crate::shape::Size;
-use crate::store::output::{Existing, Made, write_whole};
+use crate::store::output::{Existing, Made, write_whole, write_whole_seeking};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
@@ -32,6 +32,9 @@ pub fn write(
     row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<Made> {
     encoding.check_size(size)?;
+    if encoding.ending == Ending::Exr {
+        return write_whole_seeking(path, existing, |output| exr(output, size, row));
+    }
     write_whole(path, existing, |output| match encoding.ending {
         Ending::Png => png(output, encoding.bits, size, meaning, row),
         Ending::Exr => exr(output, size, row),

@@ -58,12 +58,13 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::error::{Error, Kind};
+    use crate::run::budget;
     use crate::run::progress::Silent;
     use std::sync::atomic::AtomicBool;
     use std::time::Duration;
 
     fn context(stop: &AtomicBool) -> Context<'_> {
-        Context::new(&Silent, stop, 4, 100).unwrap()
+        Context::new(&Silent, stop, 4, budget::OWN_BYTES + 100).unwrap()
     }
 
     #[test]

@@ -58,9 +58,8 @@ impl Plan {
         json!({"stage": "appearance", "model": self.model.path(), "recipe": self.recipe})
     }
 
-    /// Whether a run would find it done.
+    /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
     pub fn is_done(&self) -> bool {
-        // Another recipe is made anew.
         self.model.is_done(Stage::Appearance, &self.recipe).unwrap_or(false)
     }
 

@@ -70,12 +70,9 @@ impl Plan {
         json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
     }
 
-    /// Whether a run would find it done.
-    ///
-    /// # Errors
-    /// Where it has been run by another recipe.
-    pub fn is_done(&self) -> Result<bool> {
-        self.model.is_done(Stage::Normals, &self.recipe)
+    /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
+    pub fn is_done(&self) -> bool {
+        self.model.is_done(Stage::Normals, &self.recipe).unwrap_or(false)
     }
 
     /// Estimates the normal map, unless that is done.

@@ -207,10 +207,12 @@ impl Store {
     /// [`Kind::Missing`] where there is none.
     pub(super) fn array_document(&self, name: &str) -> Result<Map<String, Value>> {
         let file = self.metadata_path(name);
-        read_object(&file).map_err(|error| error.hint(REMADE))?.ok_or_else(|| {
-            Error::missing(format!("{}: no array {name} in this store", self.path().display()))
-                .hint("run the command that makes this store again; it goes on where it stopped")
-        })
+        read_object(&file)
+            .map_err(|error| if error.kind() == Kind::Io { error } else { error.hint(REMADE) })?
+            .ok_or_else(|| {
+                Error::missing(format!("{}: no array {name} in this store", self.path().display()))
+                    .hint("run the command that makes this store again; it goes on where it stopped")
+            })
     }
 
     /// The shape that an array claims, of so many dimensions; nothing else of it is checked.

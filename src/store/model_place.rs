@@ -60,7 +60,8 @@ fn read(index: &Path) -> Option<String> {
     }
     let mut text = String::new();
     File::open(path).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;
-    Some(text).filter(|way| !way.is_empty() && Path::new(way).is_relative())
+    Some(text)
+        .filter(|way| !way.is_empty() && !way.contains(char::is_control) && Path::new(way).is_relative())
 }
 
 /// The way from the folder of an index to a model, with `/` between its parts; none to one beside it.

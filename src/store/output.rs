@@ -33,9 +33,11 @@ impl Existing {
     pub fn expect_free(self, path: &Path) -> Result<()> {
         match self {
             Self::Keep if is_there(path) => Err(taken(path, "exists")),
-            Self::Replace if path.is_dir() => Err(Error::recipe(format!("{} is a folder", path.display()))
-                .hint("choose another name for the result")),
-            _ => Ok(()),
+            _ => match special(path) {
+                Some(kind) => Err(Error::recipe(format!("{} is {kind}, expected a file", path.display()))
+                    .hint("choose another name for the result")),
+                None => Ok(()),
+            },
         }
     }
 }
@@ -52,6 +54,17 @@ pub enum Made {
 /// Whether anything has this name, a link that leads nowhere too.
 fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
+}
+
+/// What has this name, if it is anything but a file; a link is not followed, since a rename would put a file in its place.
+fn special(path: &Path) -> Option<&'static str> {
+    let kind = path.symlink_metadata().ok()?.file_type();
+    match () {
+        () if kind.is_file() => None,
+        () if kind.is_dir() => Some("a folder"),
+        () if kind.is_symlink() => Some("a link"),
+        () => Some("a pipe, a socket or a device"),
+    }
 }
 
 fn taken(path: &Path, how: &str) -> Error {
@@ -145,6 +158,36 @@ pub fn write_whole(
     Ok(Made::Written)
 }
 
+/// As [`write_whole`], for a `write` that goes back and changes what it wrote, so that only the end can be compared: the
+/// file is written under another name first.
+///
+/// # Errors
+/// As [`write_whole`].
+pub fn write_whole_seeking(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+) -> Result<Made> {
+    let failed = |error| Error::io("write", path, error);
+    if existing == Existing::Replace {
+        existing.expect_free(path)?;
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(failed)?;
+    Temporary::sweep_beside(path);
+    let temporary = Temporary::file(path).map_err(failed)?;
+    let mut output = BufWriter::with_capacity(BUFFER_BYTES, temporary.handle().map_err(failed)?);
+    write(&mut output).map_err(|error| error.at(path))?;
+    output.flush().map_err(failed)?;
+    drop(output);
+    if existing == Existing::Keep && is_there(path) {
+        return settle(temporary.path(), path, existing);
+    }
+    existing.expect_free(path)?;
+    temporary.publish(path).map_err(failed)?;
+    Ok(Made::Written)
+}
+
 /// Compares a file that is there with what `write` writes.
 fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<Made> {
     let failed = |error| Error::io("read", path, error);
@@ -224,7 +267,7 @@ pub fn write_whole_folder(
     let failed = |error| Error::io("write", path, error);
     let occupied = is_there(path);
     let folder = |root: &Path, compared| Folder { root: root.to_owned(), compared, names: Mutex::default() };
-    if occupied && !path.is_dir() {
+    if occupied && special(path) != Some("a folder") {
         return Err(taken(path, "exists and is no folder").hint("choose another name for the result"));
     }
     if occupied && existing == Existing::Keep {

@@ -222,6 +222,56 @@ fn nothing_that_exists_is_replaced_without_force() {
 }
 
 #[test]
+fn force_never_replaces_a_pipe_or_a_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("target");
+    fs::write(&target, b"mine").unwrap();
+    for (arguments, path, _) in outputs(fixture(), folder.path()) {
+        // A link to a file, and a pipe.
+        std::os::unix::fs::symlink(&target, &path).unwrap();
+        let told = fail(run(&arguments, &[]).arg("--force"), 65);
+        assert!(told.contains("choose another name"), "{arguments:?}: {told}");
+        assert!(fs::symlink_metadata(&path).unwrap().is_symlink(), "{arguments:?}");
+        assert_eq!(fs::read(&target).unwrap(), b"mine", "{arguments:?}");
+        fs::remove_file(&path).unwrap();
+        assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
+        fail(run(&arguments, &[]).arg("--force"), 65);
+        assert!(!fs::symlink_metadata(&path).unwrap().is_file(), "{arguments:?}");
+        fs::remove_file(&path).unwrap();
+    }
+}
+
+#[test]
+fn what_cannot_be_told_is_an_error_of_output() {
+    let measurement = fixture().measurement();
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for arguments in [&["info"][..], &["info", "--json"], &["verify"], &["verify", "--json"]] {
+        let mut command = btf();
+        let output = command.args(arguments).arg(&measurement).stdout(full()).output().unwrap();
+        assert_eq!(output.status.code(), Some(74), "{arguments:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("standard output"), "{output:?}");
+    }
+}
+
+#[test]
+fn what_has_the_name_of_a_shard_and_is_no_file_is_damage_and_not_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("copy.zarr");
+    for (name, bytes) in tree(&fixture().measurement()) {
+        fs::create_dir_all(copy.join(&name).parent().unwrap()).unwrap();
+        fs::write(copy.join(&name), bytes).unwrap();
+    }
+    let shard = copy.join("reflectance/c/0/0/0/0/0");
+    fs::remove_file(&shard).unwrap();
+    fail(btf().arg("verify").arg(&copy), 66);
+    assert!(Command::new("mkfifo").arg(&shard).status().unwrap().success());
+    fail(btf().arg("verify").arg(&copy), 65);
+    fs::remove_file(&shard).unwrap();
+    fs::create_dir(&shard).unwrap();
+    fail(btf().arg("verify").arg(&copy), 65);
+}
+
+#[test]
 fn force_removes_only_what_is_of_its_kind() {
     let folder = tempfile::tempdir().unwrap();
     let foreign = folder.path().join("photos.zarr");

@@ -50,12 +50,9 @@ impl Plan {
         json!({"stage": "cluster", "model": self.model.path(), "clusters_of": self.from.path(), "recipe": self.recipe})
     }
 
-    /// Whether a run would find it done.
-    ///
-    /// # Errors
-    /// Where it has been run by another recipe.
-    pub fn is_done(&self) -> Result<bool> {
-        self.model.is_done(Stage::Cluster, &self.recipe)
+    /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
+    pub fn is_done(&self) -> bool {
+        self.model.is_done(Stage::Cluster, &self.recipe).unwrap_or(false)
     }
 
     /// Takes the clusters, unless that is done.

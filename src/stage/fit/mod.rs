@@ -83,12 +83,9 @@ impl Plan {
         json!({"stage": "fit", "model": self.model.path(), "recipe": self.recipe})
     }
 
-    /// Whether a run would find it done.
-    ///
-    /// # Errors
-    /// Where it has been run by another recipe.
-    pub fn is_done(&self) -> Result<bool> {
-        self.model.is_done(Stage::Fit, &self.recipe)
+    /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
+    pub fn is_done(&self) -> bool {
+        self.model.is_done(Stage::Fit, &self.recipe).unwrap_or(false)
     }
 
     /// Fits the field, unless that is done.

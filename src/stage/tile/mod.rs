@@ -101,15 +101,9 @@ impl Plan {
         json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
     }
 
-    /// Whether a run would find it done.
-    ///
-    /// # Errors
-    /// Where it has been run by another recipe.
-    pub fn is_done(&self) -> Result<bool> {
-        if !self.model.join("zarr.json").exists() {
-            return Ok(false);
-        }
-        Model::open(&self.model)?.is_done(Stage::Tile, &self.recipe)
+    /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
+    pub fn is_done(&self) -> bool {
+        Model::open(&self.model).is_ok_and(|model| model.is_done(Stage::Tile, &self.recipe).unwrap_or(false))
     }
 
     /// Cuts the tile, unless that is done.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
 use crate::archive::Source;
 use crate::color::Remarkable;
-use crate::error::{Error, Result};
+use crate::error::{Error, Kind, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::Window;
@@ -63,8 +63,9 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
     if let Some(source) = source {
         expect_same_shape(measurement, source)?;
     }
-    let (found, missing): (Vec<usize>, Vec<usize>) =
-        (0..description.views.len()).partition(|&view| measurement.has_view(view));
+    // A view is looked at where anything has the name of one of its files: a pipe there is damage, not a view to come.
+    let (found, missing): (Vec<usize>, Vec<usize>) = (0..description.views.len())
+        .partition(|&view| measurement.has_view(view) || measurement.obstructed(view));
     context.progress.begin("verify", found.len() as u64, Counted::Items("views"));
     let copies = if source.is_some() { 4 } else { 2 };
     let in_flight = units::in_flight(context, copies * description.view_bytes());
@@ -185,6 +186,7 @@ fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, R
             Ok((false, _)) => {
                 (SampleArray::Luminance, "L* codes that are not those of the samples".to_owned())
             }
+            Err((_, error)) if error.kind() == Kind::Io => return Err(error),
             Err((array, error)) => (array, error.to_string()),
         };
         let file = measurement.shard_path(array, view, window).display().to_string();

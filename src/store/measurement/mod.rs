@@ -305,6 +305,17 @@ impl Measurement {
         }
     }
 
+    /// Whether something that is no file has the name of a shard of a view.
+    pub(crate) fn obstructed(&self, view: usize) -> bool {
+        let arrays = [SampleArray::Reflectance, SampleArray::Luminance];
+        self.windows(self.side).any(|window| {
+            arrays.iter().any(|&array| {
+                let path = self.shard_path(array, view, window);
+                path.symlink_metadata().is_ok() && !path.is_file()
+            })
+        })
+    }
+
     fn shards(&self) -> impl Iterator<Item = (u64, u64)> + use<> {
         let Size { height, width } = self.description.size;
         let side = self.side;
@@ -446,7 +457,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let stop = std::sync::atomic::AtomicBool::new(false);
             let context = Context::new(&crate::run::progress::Silent, &stop, 1, 1 << 30).unwrap();
-            let recipe = json!({"size": size.to_string()});
+            let recipe = json!({"size": [size.height, size.width]});
             let origin = Origin { recipe: &recipe, assumptions: &[], remarks: &[] };
             let description = description(size, sample_type);
             let measurement = Measurement::create_in_shards(

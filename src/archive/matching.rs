@@ -1,7 +1,8 @@
 //! Which file a list means: lists are written on other machines, for other folders, before files are renamed.
 //!
 //! A name in a list means the file that is called so. If there is none, it means the one that differs in the Unicode form
-//! only (macOS takes letters apart), then in case, then in the ending (a list for raw files, and the JPEGs of them).
+//! only (macOS takes letters apart), then in case, then in the ending, where both are those of pictures (a list for raw
+//! files, and the JPEGs of them).
 //! Of several files of the name, the one with the longest common end of the path is meant, then the one beside the list. What is
 //! still ambiguous is refused.
 
@@ -14,6 +15,21 @@ use crate::error::{Error, Result};
 
 /// How a name in a list may differ from the file's, from best to worst.
 const LEVELS: [&str; 4] = ["", "in its Unicode form", "in case", "in its ending"];
+
+/// Endings of camera raws and of other pictures that are not read but may have been, before they were converted.
+const OTHER_PICTURES: [&str; 31] = [
+    "3fr", "arw", "avif", "bmp", "cr2", "cr3", "crw", "dng", "erf", "fff", "gif", "heic", "heif", "iiq",
+    "jp2", "jpe", "jxl", "kdc", "mef", "mos", "mrw", "nef", "nrw", "orf", "pef", "psd", "raf", "raw", "rw2",
+    "srw", "webp",
+];
+
+/// Whether a name ends as one of a picture does. (`foo.v2` does not, nor does `p0.png 0.5`: what follows the point there is
+/// part of the name, without which it may mean another file.)
+fn is_any_picture(name: &str) -> bool {
+    let other =
+        |(_, ending): (&str, &str)| OTHER_PICTURES.iter().any(|known| known.eq_ignore_ascii_case(ending));
+    super::catalogue::is_picture(name) || name.rsplit_once('.').is_some_and(other)
+}
 
 /// What a name is compared by, at each level.
 fn at_level(name: &str, level: usize) -> String {
@@ -77,7 +93,8 @@ impl<'a> Matcher<'a> {
             let wanted = at_level(last, level);
             let fits = |&&number: &&usize| {
                 let name = parts(self.names[number]).next_back().unwrap_or_default();
-                at_level(name, level) == wanted && (level < 3 || super::catalogue::is_picture(name))
+                at_level(name, level) == wanted
+                    && (level < 3 || is_any_picture(last) && super::catalogue::is_picture(name))
             };
             let found: Vec<usize> = candidates.iter().filter(fits).copied().collect();
             if found.is_empty() {
@@ -152,6 +169,7 @@ mod tests {
             (&["set/a.jpg", "set/raw/a.jpg"], "a.jpg", "set/a.jpg", None),
             (&["set/a.jpg", "set/raw/a.jpg"], "other/a.jpg", "set/a.jpg", None),
             (&["set/x/a.jpg"], "a.jpg", "set/x/a.jpg", None),
+            (&["set/a.v2.jpg"], "a.v2.Tif", "set/a.v2.jpg", Some("in its ending")),
         ] {
             assert_eq!(found(names, path), Ok((name.to_owned(), differs)), "{path} of {names:?}");
         }
@@ -165,6 +183,11 @@ mod tests {
             (&["set/a.jpg", "set/a.png"], "a.CR2", "there 2 times"),
             (&["set/a.txt"], "a.jpg", "not there"),
             (&["set/b.jpg"], "a.jpg", "not there"),
+            (&["set/a.jpg"], "a.v2", "not there"),
+            (&["set/a.jpg"], "a.png 0.5", "not there"),
+            (&["set/a.jpg"], "a.5", "not there"),
+            (&["set/a.jpg"], "a", "not there"),
+            (&["set/a.png"], "a.png 1", "not there"),
         ] {
             let error = found(names, path).unwrap_err();
             assert!(error.contains(words), "{error}");

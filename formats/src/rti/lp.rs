@@ -128,6 +128,16 @@ fn lamp(text: &str, line: usize, marks: &mut Marks) -> Result<Lamp> {
         Ok(light) => light,
         Err(expected) => return wrong(format!("the light {vector:?}"), expected.into()),
     };
+    // A fourth number: which three are the light, or whether the first is of the name, cannot be known.
+    let last = name.rsplit(char::is_whitespace).next().unwrap_or(name);
+    if last.contains(|c: char| c.is_ascii_digit()) && Marks::default().number(last).is_some() {
+        return wrong(
+            format!("the number {last:?} before the last three in {text:?}"),
+            "a file name (or none) and three numbers x y z; take other columns away, and give a file that is \
+             called by a number its ending"
+                .into(),
+        );
+    }
     if name.is_empty() {
         return Ok(Lamp { file: None, path: String::new(), light, line });
     }
@@ -262,6 +272,11 @@ mod tests {
             ("2\na.png 0 0 1\n1 0 1\n", &["line 3 without a name", "line 2 with one"]),
             ("2\na.png 0 0 1\n3\n", &["line 3", "\"3\""]),
             ("1\n/ 0 0 1\n", &["line 2", "\"/\""]),
+            ("1\np0.png 1 0.1 0.8 1\n", &["line 2", "\"1\" before", "three numbers"]),
+            ("1\np0.png\t-1,5\t0\t0\t1\n", &["line 2", "\"-1,5\" before", "three numbers"]),
+            ("1\n7\ta b.png\t1 .1 .8 1 \n", &["line 2", "\"1\" before", "three numbers"]),
+            ("p0.png 0.1 0.8 1 255\n", &["line 1", "\"0.1\" before", "three numbers"]),
+            ("0 0 1 255\n", &["line 1", "\"0\" before", "three numbers"]),
             ("2\r\na.png 0 0 1\r\nx/../a.png 1 0 1\r\n", &["line 3", "\"a.png\" again", "line 2"]),
         ] {
             let error = read_lp(text.as_bytes(), &Limits::default()).unwrap_err();

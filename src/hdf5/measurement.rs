@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::attribute::Attributes;
 use super::dataset::{File, Table};
 use crate::error::Result;
-use crate::store::{FORMAT, measurement::KIND};
+use crate::store::measurement::KIND;
 
 /// The samples, [view, y, x, light, channel].
 pub(super) const REFLECTANCE: &str = "reflectance";
@@ -17,6 +17,9 @@ pub(super) const REFLECTANCE: &str = "reflectance";
 pub(super) const LUMINANCE: &str = "luminance";
 /// Directions, [n, 2], theta and phi in radians.
 pub(super) const DIRECTIONS: [&str; 2] = ["view_direction", "light_direction"];
+
+/// Version of this layout, the attribute `format`; not that of stores.
+pub(super) const FORMAT: u64 = 1;
 
 /// The attribute `radiometry`, where the cosine of the light's angle is in the samples, and where it is not.
 pub(super) const RADIOMETRY: [(bool, &str); 2] = [

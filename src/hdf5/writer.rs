@@ -10,11 +10,11 @@ use ndarray::{ArrayView2, ArrayViewD};
 use serde_json::{Map, Value};
 
 use super::attribute;
-use super::measurement::{DIRECTIONS, LUMINANCE, RADIOMETRY, REFLECTANCE, TOLD, TRANSFER};
+use super::measurement::{DIRECTIONS, FORMAT, LUMINANCE, RADIOMETRY, REFLECTANCE, TOLD, TRANSFER};
 use crate::error::{Error, Kind, Result};
 use crate::store::mapped::{self, Temporary};
+use crate::store::measurement::KIND;
 use crate::store::output::{self, Existing, Made};
-use crate::store::{FORMAT, measurement::KIND};
 
 /// Side of a chunk in texels.
 const CHUNK_SIDE: usize = 16;

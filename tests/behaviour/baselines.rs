@@ -363,7 +363,7 @@ fn patches_of_a_tile_that_does_not_join_stay_within_it() {
     ]));
     let tile = Tile::of(&model);
     let told = fail(&mut enlarge(&model, &folder.path().join("tiles"), "tiles", "99x99"), 2);
-    assert!(told.contains("do not join") && told.contains("--tile auto"), "{told}");
+    assert!(told.contains("do not join") && told.contains("--tile cut"), "{told}");
     for method in ["roller", "quilt"] {
         let output = folder.path().join(method);
         succeed(&mut enlarge(&model, &output, method, "300x280"));

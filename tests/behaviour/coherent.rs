@@ -67,7 +67,7 @@ fn another_lattice_describes_the_appearance_anew() {
     let model = folder.path().join("m.zarr");
     succeed(&mut crate::fixture::model_of(&fixture().measurement(), &model));
     let describe = |lattice: &str| {
-        succeed(btf().arg("appearance").arg(&model).args(["--lattice", lattice]));
+        succeed(btf().arg("appearance").arg(&model).args(["--lattice", lattice, "--force"]));
         Model::open(&model).unwrap().appearance().unwrap()
     };
     let (none, ribs) = (describe("none"), describe("0,11.3"));
@@ -303,7 +303,7 @@ fn what_cannot_be_made_is_refused_and_says_what_to_do() {
 
 fn image(source: &Path, out: &Path) -> Command {
     let mut command = btf();
-    command.arg("image").arg(source).args(["--light", "30,90", "--out"]).arg(out);
+    command.arg("image").arg(source).args(["--light", "30,90", "--force", "--out"]).arg(out);
     command
 }
 

@@ -230,7 +230,7 @@ fn a_damaged_enlarged_index_is_refused() {
         ("recipe/rule", Some(json!("unheard-of")), "recipe"),
         ("recipe/rule", Some(json!(5)), "recipe"),
         ("recipe/rule", None, "fit"),
-        ("recipe/source", Some(json!("yes")), "source"),
+        ("recipe/source", Some(json!("yes")), "recipe"),
         ("recipe/source", None, "texel"),
         ("recipe/model", Some(json!("0123")), "another model"),
         ("recipe", Some(json!([])), "recipe"),

@@ -45,7 +45,7 @@ impl Material {
         let out = self.folder.path().join("panel.png");
         let window = format!("0,0,{PANEL},{PANEL}");
         let options = ["--view", "0,0", "--light", light, "--window", &window, "--out"];
-        succeed(btf().arg("image").arg(self.folder.path().join(of)).args(options).arg(&out));
+        succeed(btf().arg("image").arg(self.folder.path().join(of)).args(options).arg(&out).arg("--force"));
         let file = std::io::BufReader::new(std::fs::File::open(&out).unwrap());
         let mut reader = png::Decoder::new(file).read_info().unwrap();
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];

@@ -216,7 +216,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
         (&["--pair", "3"], 2, "VIEW,LIGHT"),
         (&["--crop", "100"], 2, "multiple of 16"),
         (&["--size", "9x9"], 2, "--size is for a model"),
-        (&["--sheet", "sheet.jpg"], 2, ".png"),
+        (&["--sheet", "sheet.exr"], 2, ".png"),
     ] {
         let told = fail(leather.judge("big.zarr").args(arguments), code);
         assert!(told.contains(part), "{told}");

@@ -116,7 +116,7 @@ fn borders_of_planes_that_were_made_to_join_are_found_to_join() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["mlvq-btf/corduroy/binary.btf", "virtual-leather/VLEATHER64.zip"] {
         let Some(archive) = shared(name) else { continue };
-        let store = folder.path().join(name.replace('/', "-"));
+        let store = folder.path().join(name.replace('/', "-") + ".zarr");
         succeed(btf().arg("import").args([&archive, &store]));
         let told = succeed(btf().arg("tile").args([&store, &store.with_extension("model")]));
         assert!(told.contains("the whole measurement; step across its borders"), "{name}: {told}");

@@ -374,8 +374,9 @@ impl Store {
         document.insert("node_type".to_owned(), json!("group"));
         document.insert("attributes".to_owned(), Value::Object(attributes));
         document.extend(members);
-        let text =
-            serde_json::to_vec_pretty(&document).map_err(|error| Error::internal(error.to_string()))?;
+        // In the order of the names: that of the writing would tell whether a run was interrupted.
+        let text = serde_json::to_vec_pretty(&recipe::canonical(&Value::Object(document)))
+            .map_err(|error| Error::internal(error.to_string()))?;
         // Nothing is touched that stays as it is.
         if metadata::read_file(&file)?.as_deref() == Some(text.as_slice()) {
             return Ok(());

@@ -222,7 +222,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
         assert!(told.contains(part), "{told}");
     }
     assert!(fail(&mut leather.judge("a.model.zarr"), 2).contains("--size WIDTHxHEIGHT"));
-    assert!(fail(&mut leather.judge("a.zarr"), 65).contains("kind measurement"));
+    assert!(fail(&mut leather.judge("a.zarr"), 65).contains("a measurement, expected"));
     assert!(fail(&mut leather.judge("nothing.zarr"), 66).contains("no store here"));
     fail(leather.judge("a.model.zarr").args(["--size", "60x256"]), 65);
     let mut other = btf();

@@ -196,10 +196,11 @@ fn nothing_that_exists_is_replaced_without_force() {
         fs::remove_file(&path).unwrap();
         // The same result is found done, and not touched.
         succeed(&mut run(&arguments, &[]));
-        let modified = |path: &Path| fs::metadata(path).unwrap().modified().unwrap();
+        // Of a store the metadata of arrays may be written again, with the same bytes.
+        let modified = |path: &Path| path.is_file().then(|| fs::metadata(path).unwrap().modified().unwrap());
         let (made, at) = (contents(&path), modified(&path));
         succeed(&mut run(&arguments, &[]));
-        assert_eq!(modified(&path), at, "{arguments:?}");
+        assert_eq!((contents(&path), modified(&path)), (made.clone(), at), "{arguments:?}");
         if other.is_empty() {
             continue;
         }

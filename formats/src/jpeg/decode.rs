@@ -37,8 +37,10 @@ pub struct Image {
 ///   modes, other than 8 bits, other than 1 or 3 components, unusual sampling factors.
 /// - [`ErrorKind::Limit`](crate::ErrorKind::Limit): more pixels or scans than `limits` allows.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
-    let structure::Walked { header, arrangement, length } = structure::walk(bytes, limits)?;
+    let structure::Walked { header, arrangement, length, not_adobe } = structure::walk(bytes, limits)?;
     let picture = bytes.get(..length).unwrap_or(bytes);
+    let picture = without_names(picture, &not_adobe);
+    let picture = picture.as_ref();
     let bytes: Cow<'_, [u8]> = match arrangement {
         Arrangement::Ordinary => Cow::Borrowed(picture),
         Arrangement::OneComponent(at) => {
@@ -69,6 +71,20 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         ));
     }
     Ok(Image { width: header.width, height: header.height, channels: header.channels, samples })
+}
+
+/// The picture with the segments whose names begin at these bytes made segments of no name, which decoders step over.
+fn without_names<'a>(picture: &'a [u8], names: &[usize]) -> Cow<'a, [u8]> {
+    if names.is_empty() {
+        return Cow::Borrowed(picture);
+    }
+    let mut plain = picture.to_vec();
+    for &at in names {
+        if let Some(letter) = plain.get_mut(at) {
+            *letter = 0;
+        }
+    }
+    Cow::Owned(plain)
 }
 
 fn undecodable(error: &DecodeErrors) -> Error {

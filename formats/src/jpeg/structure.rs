@@ -13,6 +13,9 @@ pub(super) struct Walked {
     pub(super) arrangement: Arrangement,
     /// Bytes up to the end marker, with it.
     pub(super) length: usize,
+    /// Where the names of Adobe segments stand that must not count: all in a file that is JFIF, and so YCbCr (T.871,
+    /// 6.1), in either order of the two, and those behind the first scan; as libjpeg and all that is built on it have it.
+    pub(super) not_adobe: Vec<usize>,
 }
 
 /// Reads as far as the frame header.
@@ -45,6 +48,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut restart_interval = 0;
     let mut scans = 0u32;
     let mut orientation = 1;
+    let (mut is_jfif, mut adobe) = (false, Vec::new());
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
@@ -56,6 +60,14 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
             }
             marker::DRI => restart_interval = read_restart_interval(&mut reader)?,
             marker::APP1 if frame.is_none() => orientation = read_orientation(&mut reader, orientation)?,
+            // What the colours are is settled where the first scan begins.
+            marker::APP0 if scans == 0 => is_jfif |= is_jfif_segment(marker::segment(&mut reader)?),
+            marker::APP14 => {
+                let name = reader.position().saturating_add(2);
+                if marker::segment(&mut reader)?.starts_with(b"Adobe") {
+                    adobe.push((name, scans > 0));
+                }
+            }
             marker::SOS => {
                 scans = scans.saturating_add(1);
                 if scans > limits.max_scans_per_image {
@@ -78,6 +90,11 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                     header: Header { orientation, ..frame.header },
                     arrangement: frame.arrangement(),
                     length: reader.position(),
+                    not_adobe: adobe
+                        .iter()
+                        .filter(|(_, late)| is_jfif || *late)
+                        .map(|(name, _)| *name)
+                        .collect(),
                 });
             }
             code => skip(&mut reader, code, at)?,
@@ -109,6 +126,11 @@ fn skip(reader: &mut Reader<'_>, code: u8, at: usize) -> Result<()> {
         }
         _ => Err(Error::malformed(format!("the marker ff{code:02x}"), "a marker that may stand here").at(at)),
     }
+}
+
+/// As libjpeg knows one: the name, and room for what it must hold.
+fn is_jfif_segment(segment: &[u8]) -> bool {
+    segment.starts_with(b"JFIF\0") && segment.len() >= 14
 }
 
 /// The orientation in an Exif segment; the first one that is found counts.

@@ -157,6 +157,40 @@ fn an_orientation_is_told_and_not_applied() {
 }
 
 #[test]
+fn a_jfif_file_is_ycbcr_whatever_an_adobe_segment_says() {
+    let adobe = |transform: u8| [b"\xFF\xEE\0\x0EAdobe\0\x64\0\0\0\0", &[transform][..]].concat();
+    for progressive in [false, true] {
+        let plain = jpeg_of(16, 16, 3, &options(95, progressive, Chroma::Half));
+        assert_eq!(plain[..11], *b"\xFF\xD8\xFF\xE0\0\x10JFIF\0");
+        let (start, jfif, rest) = (&plain[..2], &plain[2..20], &plain[20..]);
+        let samples = |bytes: &[u8]| decode(bytes, &Limits::default()).unwrap().samples;
+        let expected = samples(&plain);
+        for transform in 0..=2 {
+            let adobe = adobe(transform);
+            assert_eq!(samples(&[start, jfif, &adobe, rest].concat()), expected, "{transform}");
+            assert_eq!(samples(&[start, &adobe, jfif, rest].concat()), expected, "{transform}");
+        }
+        assert_eq!(samples(&[start, rest].concat()), expected);
+        assert_eq!(samples(&[start, &adobe(1), rest].concat()), expected);
+        // Alone it counts: what was luminance is red.
+        let rgb = samples(&[start, &adobe(0), rest].concat());
+        let short = [start, b"\xFF\xE0\0\x07JFIF\0", &adobe(0), rest].concat();
+        assert_eq!(samples(&short), rgb, "a segment that is too short to be JFIF's");
+        for (rgb, expected) in rgb.chunks(3).zip(expected.chunks(3)) {
+            let [r, g, b] = [0, 1, 2].map(|channel| f64::from(expected[channel]));
+            let luminance = 0.299 * r + 0.587 * g + 0.114 * b;
+            assert!((f64::from(rgb[0]) - luminance).abs() < 16.0, "{rgb:?} {expected:?}");
+        }
+        assert_ne!(rgb, expected);
+        if progressive {
+            let end = after_marker(&plain, 0xDA, 1) - 2;
+            let late = [start, &plain[20..end], &adobe(0), &plain[end..]].concat();
+            assert_eq!(samples(&late), expected, "behind the first scan");
+        }
+    }
+}
+
+#[test]
 fn a_missing_scan_is_noticed_even_if_the_end_marker_is_there() {
     for (channels, scans) in [(1, 4), (3, 12)] {
         let whole = jpeg_of(24, 24, channels, &EncodeOptions::UBO2003);

@@ -154,10 +154,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                 sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
                 for channel in 0..channels {
                     match difference(measured + channel, modelled + channel) {
-                        Some(difference) => {
-                            sums.squares += difference * difference;
-                            sums.sample_count += 1;
-                        }
+                        Some(difference) => sums.squares += difference * difference,
                         None => sums.left_out += 1,
                     }
                 }
@@ -170,6 +167,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
             }
             sums.code_count += description.lights.len() as u64;
         }
+        sums.sample_count = (offsets.len() * texel) as u64 - sums.left_out;
         context.progress.advance(1);
         Ok(sums)
     })?;

@@ -7,6 +7,7 @@
 
 use std::path::Path;
 
+use super::places::places;
 use super::read::DAMAGED;
 use super::{Array, Store, shard};
 use crate::error::{Error, Result};
@@ -34,18 +35,11 @@ impl Store {
     /// # Errors
     /// As [`Store::checksums`].
     pub(super) fn checksum(&self, array: &Array, row: u64) -> Result<u32> {
-        let grid = array.grid();
-        let rest: Vec<u64> = grid.iter().skip(1).copied().collect();
-        let count: u64 = rest.iter().product();
-        let mut sum = 0;
-        for number in 0..count {
-            let mut left = number;
-            let mut place: Vec<u64> = rest.iter().rev().map(|&n| (left % n, left /= n).0).collect();
-            place.push(row);
-            place.reverse();
-            sum = of_file(&self.chunk_path(array, &place), array.shard_chunks(), sum)?;
-        }
-        Ok(sum)
+        let mut end = array.grid();
+        let mut first = vec![0; end.len()];
+        (first[0], end[0]) = (row, row + 1);
+        places(&first, &end)
+            .try_fold(0, |sum, place| of_file(&self.chunk_path(array, &place), array.shard_chunks(), sum))
     }
 }
 

@@ -179,7 +179,7 @@ pub(crate) fn same_file(file: &File, path: &Path) -> bool {
 }
 
 /// The folder that a file lies in.
-fn folder_of(path: &Path) -> &Path {
+pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -229,13 +229,14 @@ fn remove_abandoned(path: &Path) {
     drop(opened);
 }
 
-/// What lies there where it is no file: a folder, a pipe, a device or a socket.
+/// What lies there where it is no file: a folder, a link, a pipe, a device or a socket.
 pub(crate) fn special(data: &fs::Metadata) -> Option<&'static str> {
     use std::os::unix::fs::FileTypeExt;
     let kind = data.file_type();
     match kind {
         _ if kind.is_file() => None,
         _ if kind.is_dir() => Some("a folder"),
+        _ if kind.is_symlink() => Some("a link"),
         _ if kind.is_fifo() => Some("a pipe"),
         _ if kind.is_socket() => Some("a socket"),
         _ => Some("a device"),

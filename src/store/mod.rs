@@ -20,6 +20,7 @@ pub mod model;
 pub(crate) mod model_place;
 pub mod output;
 pub mod passes;
+mod places;
 mod read;
 pub mod recognise;
 mod shard;
@@ -145,13 +146,7 @@ impl Store {
     /// Whether all chunks (or shards) of an array are there.
     pub fn has_all(&self, array: &Array) -> bool {
         let grid = array.grid();
-        let total = grid.iter().try_fold(1u64, |product, &n| product.checked_mul(n)).unwrap_or(u64::MAX);
-        (0..total).all(|number| {
-            let mut rest = number;
-            let mut indices: Vec<u64> = grid.iter().rev().map(|&n| (rest % n, rest /= n).0).collect();
-            indices.reverse();
-            self.has_chunk(array, &indices)
-        })
+        places::places(&vec![0; grid.len()], &grid).all(|place| self.has_chunk(array, &place))
     }
 
     /// Our attributes (key `btfkit`) of the root group; `None` where there is none, or not ours.

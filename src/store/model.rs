@@ -823,7 +823,7 @@ impl Clusters {
 
 /// Bytes of an index of so many texels into so many clusters.
 pub fn index_bytes(texels: usize, clusters: usize) -> u64 {
-    texels as u64 * if clusters <= 256 { 1 } else { 2 }
+    texels as u64 * if clusters <= NARROW { 1 } else { 2 }
 }
 
 /// Measured colour BRDFs, one a cluster.

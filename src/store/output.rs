@@ -9,7 +9,7 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use super::mapped::{Temporary, publish, temporary_name, write_file};
+use super::mapped::{self, Temporary, folder_of, publish, temporary_name, write_file};
 use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
@@ -58,13 +58,7 @@ fn is_there(path: &Path) -> bool {
 
 /// What has this name, if it is anything but a file; a link is not followed, since a rename would put a file in its place.
 fn special(path: &Path) -> Option<&'static str> {
-    let kind = path.symlink_metadata().ok()?.file_type();
-    match () {
-        () if kind.is_file() => None,
-        () if kind.is_dir() => Some("a folder"),
-        () if kind.is_symlink() => Some("a link"),
-        () => Some("a pipe, a socket or a device"),
-    }
+    mapped::special(&path.symlink_metadata().ok()?)
 }
 
 fn taken(path: &Path, how: &str) -> Error {
@@ -138,23 +132,14 @@ pub fn write_whole(
     existing: Existing,
     write: impl FnOnce(&mut Output) -> Result<()>,
 ) -> Result<Made> {
-    let failed = |error| Error::io("write", path, error);
     if existing == Existing::Keep && is_there(path) {
         return compare(path, write);
     }
     existing.expect_free(path)?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(failed)?;
-    Temporary::sweep_beside(path);
-    let temporary = Temporary::file(path).map_err(failed)?;
-    let file = temporary.handle().map_err(failed)?;
-    let mut output = Output { to: To::File(BufWriter::with_capacity(BUFFER_BYTES, file)) };
-    write(&mut output).map_err(|error| error.at(path))?;
-    output.flush().map_err(failed)?;
-    drop(output);
+    let temporary = written(path, write)?;
     // Another may have taken the name meanwhile.
     existing.expect_free(path)?;
-    temporary.publish(path).map_err(failed)?;
+    temporary.publish(path).map_err(|error| Error::io("write", path, error))?;
     Ok(Made::Written)
 }
 
@@ -166,26 +151,31 @@ pub fn write_whole(
 pub fn write_whole_seeking(
     path: &Path,
     existing: Existing,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
+    write: impl FnOnce(&mut Output) -> Result<()>,
 ) -> Result<Made> {
-    let failed = |error| Error::io("write", path, error);
     if existing == Existing::Replace {
         existing.expect_free(path)?;
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).map_err(failed)?;
-    Temporary::sweep_beside(path);
-    let temporary = Temporary::file(path).map_err(failed)?;
-    let mut output = BufWriter::with_capacity(BUFFER_BYTES, temporary.handle().map_err(failed)?);
-    write(&mut output).map_err(|error| error.at(path))?;
-    output.flush().map_err(failed)?;
-    drop(output);
+    let temporary = written(path, write)?;
     if existing == Existing::Keep && is_there(path) {
         return settle(temporary.path(), path, existing);
     }
     existing.expect_free(path)?;
-    temporary.publish(path).map_err(failed)?;
+    temporary.publish(path).map_err(|error| Error::io("write", path, error))?;
     Ok(Made::Written)
+}
+
+/// A file beside `path` that `write` has filled.
+fn written(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<Temporary> {
+    let failed = |error| Error::io("write", path, error);
+    fs::create_dir_all(folder_of(path)).map_err(failed)?;
+    Temporary::sweep_beside(path);
+    let temporary = Temporary::file(path).map_err(failed)?;
+    let file = temporary.handle().map_err(failed)?;
+    let mut output = Output { to: To::File(BufWriter::with_capacity(BUFFER_BYTES, file)) };
+    write(&mut output).map_err(|error| error.at(path))?;
+    output.flush().map_err(failed)?;
+    Ok(temporary)
 }
 
 /// Compares a file that is there with what `write` writes.

@@ -12,6 +12,7 @@ use zstd::bulk::Decompressor;
 
 use super::array::{Array, Layout, Named};
 use super::mapped::MappedFile;
+use super::places::{advance, places};
 use super::{Store, sample_type_of, shard};
 use crate::error::{Error, Result};
 
@@ -31,6 +32,13 @@ struct Piece {
     file: usize,
     /// None for a chunk that is absent from its shard: all zero.
     bytes: Option<Range<usize>>,
+}
+
+/// A file that a box touches, and where its first element lies in the array.
+struct Touched {
+    corner: Vec<u64>,
+    path: PathBuf,
+    file: MappedFile,
 }
 
 impl Store {
@@ -87,7 +95,7 @@ impl Store {
         let decode = |decompressor: &mut Option<Decompressor<'static>>, piece: &Piece| -> Result<Vec<T>> {
             let mut chunk = vec![T::default(); count];
             if let Some(range) = &piece.bytes {
-                let (path, file) = &files[piece.file];
+                let Touched { path, file, .. } = &files[piece.file];
                 let bytes = file.as_ref().get(range.clone()).unwrap_or_default();
                 decompress(decompressor, bytes, bytemuck::cast_slice_mut(&mut chunk)).map_err(|what| {
                     let place = if array.shard.is_some() {
@@ -116,21 +124,17 @@ impl Store {
     }
 
     /// The files that a box touches, in C order.
-    fn files_of(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<(PathBuf, MappedFile)>> {
+    fn files_of(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<Touched>> {
         let outer = array.outer();
         let first: Vec<u64> = start.iter().zip(outer).map(|(&at, &side)| at / side).collect();
         let end: Vec<u64> =
             start.iter().zip(extent).zip(outer).map(|((&at, &n), &side)| (at + n).div_ceil(side)).collect();
-        let mut files = Vec::new();
-        let mut place = first.clone();
-        loop {
+        let touched = |place: Vec<u64>| {
             let path = self.chunk_path(array, &place);
-            let file = Self::map_chunk(&path)?;
-            files.push((path, file));
-            if !advance(&mut place, &first, &end) {
-                return Ok(files);
-            }
-        }
+            let corner = place.iter().zip(outer).map(|(&at, &side)| at * side).collect();
+            Ok(Touched { corner, file: Self::map_chunk(&path)?, path })
+        };
+        places(&first, &end).map(touched).collect()
     }
 
     /// Reads a whole array of this layout.
@@ -167,66 +171,33 @@ impl Store {
 }
 
 /// The chunks of a box, in the order of the files.
-fn pieces_of(
-    array: &Array,
-    start: &[u64],
-    extent: &[u64],
-    files: &[(PathBuf, MappedFile)],
-) -> Result<Vec<Piece>> {
+fn pieces_of(array: &Array, start: &[u64], extent: &[u64], files: &[Touched]) -> Result<Vec<Piece>> {
     let outer = array.outer();
     let end: Vec<u64> = start.iter().zip(extent).map(|(&at, &n)| at + n).collect();
-    let first_file: Vec<u64> = start.iter().zip(outer).map(|(&at, &side)| at / side).collect();
-    let end_file: Vec<u64> = end.iter().zip(outer).map(|(&at, &side)| at.div_ceil(side)).collect();
-    let mut place = first_file.clone();
     let mut pieces = Vec::new();
-    for (number, (path, file)) in files.iter().enumerate() {
-        let corner: Vec<u64> = place.iter().zip(outer).map(|(&at, &side)| at * side).collect();
-        match array.shard_chunks() {
-            None => {
-                let bytes = Some(0..file.as_ref().len());
-                pieces.push(Piece { origin: corner, file: number, bytes });
-            }
-            Some(chunks) => {
-                let damaged =
-                    |what: String| Error::input(format!("{}: {what}", path.display())).hint(DAMAGED);
-                let ranges = shard::chunk_ranges(file.as_ref(), chunks).map_err(damaged)?;
-                // Chunks of the shard that the box touches, counted from the shard's corner.
-                let inner = |axis: usize, at: u64| at.saturating_sub(corner[axis]).min(outer[axis]);
-                let axes = 0..corner.len();
-                let first: Vec<u64> =
-                    axes.clone().map(|axis| inner(axis, start[axis]) / array.chunk[axis]).collect();
-                let last: Vec<u64> =
-                    axes.clone().map(|axis| inner(axis, end[axis]).div_ceil(array.chunk[axis])).collect();
-                let mut at = first.clone();
-                loop {
-                    let number_in_shard = axes
-                        .clone()
-                        .fold(0, |number, axis| number * (outer[axis] / array.chunk[axis]) + at[axis]);
-                    let origin =
-                        axes.clone().map(|axis| corner[axis] + at[axis] * array.chunk[axis]).collect();
-                    let bytes = ranges.get(number_in_shard as usize).cloned().flatten();
-                    pieces.push(Piece { origin, file: number, bytes });
-                    if !advance(&mut at, &first, &last) {
-                        break;
-                    }
-                }
-            }
+    for (number, Touched { corner, path, file }) in files.iter().enumerate() {
+        let Some(chunks) = array.shard_chunks() else {
+            let bytes = Some(0..file.as_ref().len());
+            pieces.push(Piece { origin: corner.clone(), file: number, bytes });
+            continue;
+        };
+        let damaged = |what: String| Error::input(format!("{}: {what}", path.display())).hint(DAMAGED);
+        let ranges = shard::chunk_ranges(file.as_ref(), chunks).map_err(damaged)?;
+        // Chunks of the shard that the box touches, counted from the shard's corner.
+        let inner = |axis: usize, at: u64| at.saturating_sub(corner[axis]).min(outer[axis]);
+        let axes = 0..corner.len();
+        let first: Vec<u64> = axes.clone().map(|axis| inner(axis, start[axis]) / array.chunk[axis]).collect();
+        let last: Vec<u64> =
+            axes.clone().map(|axis| inner(axis, end[axis]).div_ceil(array.chunk[axis])).collect();
+        for at in places(&first, &last) {
+            let number_in_shard =
+                axes.clone().fold(0, |number, axis| number * (outer[axis] / array.chunk[axis]) + at[axis]);
+            let origin = axes.clone().map(|axis| corner[axis] + at[axis] * array.chunk[axis]).collect();
+            let bytes = ranges.get(number_in_shard as usize).cloned().flatten();
+            pieces.push(Piece { origin, file: number, bytes });
         }
-        advance(&mut place, &first_file, &end_file);
     }
     Ok(pieces)
-}
-
-/// The next place in C order between two corners; false after the last.
-fn advance(place: &mut [u64], first: &[u64], end: &[u64]) -> bool {
-    for axis in (0..place.len()).rev() {
-        place[axis] += 1;
-        if place[axis] < end[axis] {
-            return true;
-        }
-        place[axis] = first[axis];
-    }
-    false
 }
 
 /// Decompresses to exactly as many bytes as `out` has.

@@ -7,16 +7,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 use crate::coherent::{enlarge, model};
-use crate::fixture::{btf, fail, succeed, tree};
-
-/// Copies a store.
-fn copy(from: &Path, to: &Path) {
-    for (name, bytes) in tree(from) {
-        let to = to.join(name);
-        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
-        std::fs::write(to, bytes).unwrap();
-    }
-}
+use crate::fixture::{btf, copy, fail, succeed, tree};
 
 /// Changes a member of a JSON file, or takes it away.
 fn change(file: &Path, pointer: &str, value: Option<Value>) {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::fixture::{btf, fail, fixture, succeed};
+use crate::fixture::{btf, copy, fail, fixture, succeed};
 
 /// Names of all commands, as the general help lists them in its groups.
 fn commands() -> Vec<String> {
@@ -309,13 +309,6 @@ fn the_passes_of_a_factorisation_are_counted() {
         2,
     );
     assert!(told.contains("got --rank 99999"), "{told}");
-}
-
-fn copy(from: &Path, to: &Path) {
-    for (name, bytes) in crate::fixture::tree(from) {
-        std::fs::create_dir_all(to.join(&name).parent().unwrap()).unwrap();
-        std::fs::write(to.join(name), bytes).unwrap();
-    }
 }
 
 #[test]

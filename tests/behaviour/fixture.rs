@@ -106,6 +106,15 @@ pub fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
+/// Copies a store, to be harmed or moved.
+pub fn copy(from: &Path, to: &Path) {
+    for (name, bytes) in tree(from) {
+        let to = to.join(name);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::write(to, bytes).unwrap();
+    }
+}
+
 /// Asserts that two stores hold the same files with the same bytes, but for the note of where an index's model lies.
 pub fn assert_same(first: &Path, second: &Path) {
     let made = |store: &Path| {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use crate::fixture::{btf, fail, fixture, succeed};
+use crate::fixture::{btf, copy, fail, fixture, succeed};
 
 /// Runs a command; returns its exit code and the lines of both streams.
 fn run(command: &mut Command) -> (Option<i32>, Vec<String>, Vec<String>) {
@@ -19,13 +19,6 @@ fn bad(folder: &Path, name: &str) -> PathBuf {
     let path = folder.join(name);
     std::fs::write(&path, "nothing that anybody knows").unwrap();
     path
-}
-
-fn copy(from: &Path, to: &Path) {
-    for (name, bytes) in crate::fixture::tree(from) {
-        std::fs::create_dir_all(to.join(&name).parent().unwrap()).unwrap();
-        std::fs::write(to.join(name), bytes).unwrap();
-    }
 }
 
 #[test]

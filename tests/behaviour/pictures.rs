@@ -122,10 +122,7 @@ fn chunk_range(shard: &[u8], number: usize) -> std::ops::Range<usize> {
 fn a_window_reads_only_the_chunks_that_it_touches() {
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("broken.zarr");
-    for (name, bytes) in crate::fixture::tree(&fixture().enlarged()) {
-        std::fs::create_dir_all(broken.join(&name).parent().unwrap()).unwrap();
-        std::fs::write(broken.join(name), bytes).unwrap();
-    }
+    crate::fixture::copy(&fixture().enlarged(), &broken);
     let image = |source: &Path, window: &str, name: &str| {
         let mut command = btf();
         command.arg("image").arg(source).arg("--model").arg(fixture().model());

@@ -258,10 +258,7 @@ fn what_cannot_be_told_is_an_error_of_output() {
 fn what_has_the_name_of_a_shard_and_is_no_file_is_damage_and_not_missing() {
     let folder = tempfile::tempdir().unwrap();
     let copy = folder.path().join("copy.zarr");
-    for (name, bytes) in tree(&fixture().measurement()) {
-        fs::create_dir_all(copy.join(&name).parent().unwrap()).unwrap();
-        fs::write(copy.join(&name), bytes).unwrap();
-    }
+    crate::fixture::copy(&fixture().measurement(), &copy);
     let shard = copy.join("reflectance/c/0/0/0/0/0");
     fs::remove_file(&shard).unwrap();
     fail(btf().arg("verify").arg(&copy), 66);
@@ -295,10 +292,7 @@ fn force_removes_only_what_is_of_its_kind() {
     }
     // A store of another kind is no less dear.
     let copy = folder.path().join("copy.zarr");
-    for (name, bytes) in tree(&fixture().model()) {
-        fs::create_dir_all(copy.join(&name).parent().unwrap()).unwrap();
-        fs::write(copy.join(&name), bytes).unwrap();
-    }
+    crate::fixture::copy(&fixture().model(), &copy);
     let before = tree(&copy);
     fail(btf().arg("import").args([&fixture().archive(), &copy]).arg("--force"), 65);
     assert_eq!(tree(&copy), before);
@@ -434,10 +428,7 @@ fn what_may_not_be_read_is_not_called_damaged() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path().join("m.zarr");
-    for (name, bytes) in tree(&fixture().measurement()) {
-        fs::create_dir_all(store.join(&name).parent().unwrap()).unwrap();
-        fs::write(store.join(&name), bytes).unwrap();
-    }
+    crate::fixture::copy(&fixture().measurement(), &store);
     let probe = folder.path().join("probe");
     fs::write(&probe, b"").unwrap();
     fs::set_permissions(&probe, fs::Permissions::from_mode(0o0)).unwrap();
@@ -550,10 +541,7 @@ fn what_others_wrote_is_shown_escaped() {
     }
     // Attributes of a store.
     let store = folder.path().join("store.zarr");
-    for (name, bytes) in tree(&fixture().measurement()) {
-        fs::create_dir_all(store.join(&name).parent().unwrap()).unwrap();
-        fs::write(store.join(&name), bytes).unwrap();
-    }
+    crate::fixture::copy(&fixture().measurement(), &store);
     let file = store.join("zarr.json");
     let mut metadata: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
     metadata["attributes"]["btfkit"]["assumptions"] = serde_json::json!([wild]);

@@ -2,20 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::fixture::{assert_same, btf, fail, fixture, succeed, tree_names};
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            copy(&path, &target);
-        } else {
-            std::fs::copy(&path, &target).unwrap();
-        }
-    }
-}
+use crate::fixture::{assert_same, btf, copy, fail, fixture, succeed, tree_names};
 
 /// The fixture's measurement, to be harmed.
 fn copied(folder: &Path) -> PathBuf {

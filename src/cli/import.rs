@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
@@ -10,6 +10,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::outputs::wanted_twice;
 use super::source::SourceArgs;
 use super::{Tell, bytes_text, number};
 
@@ -91,14 +92,11 @@ impl Import {
                     store: import::default_store(path, &folder),
                 };
                 let jobs: Vec<Job> = self.paths.iter().map(job).collect();
-                let mut stores: Vec<&Path> = jobs.iter().map(|job| job.store.as_path()).collect();
-                stores.sort();
-                match stores.windows(2).find(|pair| pair[0] == pair[1]) {
-                    Some(pair) => Err(Error::new(
-                        Kind::Usage,
-                        format!("two archives would both become {}", pair[0].display()),
-                    )
-                    .hint("import them one by one and name the stores")),
+                match wanted_twice(jobs.iter().map(|job| job.store.as_path())) {
+                    Some(store) => {
+                        Err(Error::usage(format!("two archives would both become {}", store.display()))
+                            .hint("import them one by one and name the stores"))
+                    }
                     None => Ok(jobs),
                 }
             }

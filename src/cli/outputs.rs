@@ -35,11 +35,9 @@ impl Naming<'_> {
         }
         let pair = |input: &PathBuf| Pair { input: input.clone(), output: self.output(input, into) };
         let pairs: Vec<Pair> = names.iter().map(pair).collect();
-        let mut outputs: Vec<&Path> = pairs.iter().map(|pair| pair.output.as_path()).collect();
-        outputs.sort();
-        match outputs.windows(2).find(|pair| pair[0] == pair[1]) {
+        match wanted_twice(pairs.iter().map(|pair| pair.output.as_path())) {
             None => Ok(pairs),
-            Some(pair) => Err(Error::usage(format!("two inputs would both become {}", pair[0].display()))
+            Some(output) => Err(Error::usage(format!("two inputs would both become {}", output.display()))
                 .hint("give them one by one and name the outputs")),
         }
     }
@@ -61,6 +59,13 @@ impl Naming<'_> {
             None => input.components().collect::<PathBuf>().with_file_name(name),
         }
     }
+}
+
+/// An output that two inputs would become, if there is one.
+pub(super) fn wanted_twice<'a>(outputs: impl Iterator<Item = &'a Path>) -> Option<&'a Path> {
+    let mut outputs: Vec<&Path> = outputs.collect();
+    outputs.sort();
+    outputs.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
 }
 
 fn file_name(path: &Path) -> String {

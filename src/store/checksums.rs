@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 const END_BYTES: usize = 4;
 
 /// Digits of a checksum as it is kept.
-pub(super) const DIGITS: usize = 8;
+pub(crate) const DIGITS: usize = 8;
 
 impl Store {
     /// Checksums of an array's files: for each place along the first dimension, [`DIGITS`] hexadecimal digits for all

@@ -188,6 +188,13 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
 }
 
+/// Removes a folder, moved away first: at no time does a part of it look like something unfinished.
+pub(crate) fn remove_folder(path: &Path) -> Result<()> {
+    let old = temporary_name(path);
+    let removed = fs::rename(path, &old).and_then(|()| fs::remove_dir_all(&old));
+    removed.map_err(|error| Error::io("remove", path, error))
+}
+
 /// The temporary name beside `path`: process ids repeat across hosts, so it bears host, pid and random bits.
 pub(crate) fn temporary_name(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

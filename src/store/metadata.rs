@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::mapped::refuse_special;
+use super::mapped::{refuse_special, write_file};
 use crate::error::{Error, Result};
 use crate::run::recipe;
 
@@ -71,6 +71,20 @@ pub(crate) fn read_object(path: &Path) -> Result<Option<Map<String, Value>>> {
         }
         Err(error) => Err(Error::input(format!("{}: {error}", path.display()))),
     }
+}
+
+/// Writes a JSON object as a file of metadata, unless the file holds just that already.
+///
+/// # Errors
+/// Those of reading and writing.
+pub(crate) fn write_object(path: &Path, object: Map<String, Value>) -> Result<()> {
+    // In the order of the names: that of the writing would tell whether a run was interrupted.
+    let text = serde_json::to_vec_pretty(&recipe::canonical(&Value::Object(object)))
+        .map_err(|error| Error::internal(error.to_string()))?;
+    if read_file(path)?.as_deref() == Some(text.as_slice()) {
+        return Ok(());
+    }
+    write_file(path, &text)
 }
 
 /// A value in a message: not longer than a line.

@@ -4,7 +4,7 @@
 
 pub mod appearance;
 mod array;
-mod checksums;
+pub(crate) mod checksums;
 pub mod codec;
 mod consolidated;
 mod directions;
@@ -280,11 +280,7 @@ impl Store {
         if !is_another()? {
             return Ok(());
         }
-        // Moved away first: at no time is there a store with a part of its shards that looks like an unfinished one.
-        let old = mapped::temporary_name(&self.path);
-        let failed = |error| Error::io("remove", &self.path, error);
-        std::fs::rename(&self.path, &old).map_err(failed)?;
-        std::fs::remove_dir_all(&old).map_err(failed)
+        mapped::remove_folder(&self.path)
     }
 
     /// The kind that a root names, however damaged its other attributes are.
@@ -369,14 +365,7 @@ impl Store {
         document.insert("node_type".to_owned(), json!("group"));
         document.insert("attributes".to_owned(), Value::Object(attributes));
         document.extend(members);
-        // In the order of the names: that of the writing would tell whether a run was interrupted.
-        let text = serde_json::to_vec_pretty(&recipe::canonical(&Value::Object(document)))
-            .map_err(|error| Error::internal(error.to_string()))?;
-        // Nothing is touched that stays as it is.
-        if metadata::read_file(&file)?.as_deref() == Some(text.as_slice()) {
-            return Ok(());
-        }
-        mapped::write_file(&file, &text)
+        metadata::write_object(&file, document)
     }
 
     /// Removes an array; nothing where there is none.

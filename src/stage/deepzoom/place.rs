@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use super::Encoding;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
-use crate::store::mapped::{self, MappedStorage, Temporary, write_file};
+use crate::store::mapped::{self, MappedStorage, Temporary};
 use crate::store::output::Existing;
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::store::{FORMAT, Store, is_lock, metadata};
@@ -137,12 +137,7 @@ impl Place {
     pub(super) fn write_state(&self, mut state: Map<String, Value>) -> Result<()> {
         let seal = metadata::seal(&state);
         state.insert("seal".to_owned(), json!(seal));
-        let path = self.folder.join(STATE);
-        let text = serde_json::to_vec_pretty(&state).map_err(|error| Error::internal(error.to_string()))?;
-        if metadata::read_file(&path)?.as_deref() == Some(text.as_slice()) {
-            return Ok(());
-        }
-        write_file(&path, &text)
+        metadata::write_object(&self.folder.join(STATE), state)
     }
 
     /// Removes another recipe's pyramid.
@@ -161,10 +156,7 @@ impl Place {
                 _ => {}
             }
         }
-        let old = mapped::temporary_name(&self.folder);
-        let failed = |error| Error::io("remove", &self.folder, error);
-        std::fs::rename(&self.folder, &old).map_err(failed)?;
-        std::fs::remove_dir_all(&old).map_err(failed)
+        mapped::remove_folder(&self.folder)
     }
 
     /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.

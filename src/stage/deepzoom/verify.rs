@@ -16,6 +16,7 @@ use crate::run::progress::Counted;
 use crate::shape::Size;
 use crate::stage::about::{Kept, Pyramidal, bytes_below};
 use crate::stage::verify::Report;
+use crate::store::checksums::DIGITS;
 use crate::store::mapped::MappedFile;
 use crate::store::metadata;
 use crate::store::recognise::PYRAMID_FOLDER;
@@ -25,9 +26,6 @@ pub(super) const CHECKSUMS: &str = "checksums";
 
 /// Longest side of a picture.
 const MOST_SIDE: usize = 1 << 24;
-
-/// Digits of a checksum.
-const DIGITS: usize = 8;
 
 const ANEW: &str =
     "delete this file and run the command that made the pyramid again, which writes what is missing";

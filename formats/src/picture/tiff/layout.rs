@@ -115,7 +115,11 @@ impl Layout {
         if directory.number(tag::FILL_ORDER, Some(1))? != 1 {
             return of("fill order 2".to_owned(), "1");
         }
-        let orientation = match directory.number(tag::ORIENTATION, Some(1))? {
+        // Cameras put it into the first directory, whichever is the picture.
+        let stated = directory.list(tag::ORIENTATION)?.is_some();
+        let stated_for_file =
+            if stated { 1 } else { Directory::first(bytes)?.number(tag::ORIENTATION, Some(1))? };
+        let orientation = match directory.number(tag::ORIENTATION, Some(stated_for_file))? {
             0 => 1,
             stated => match u8::try_from(stated) {
                 Ok(stated @ 1..=8) => stated,

@@ -25,7 +25,11 @@ const FRONTAL: &str = "there are no view directions: one frontal view";
 /// Names every missing and every duplicate image; or says why the names tell nothing.
 pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Limits) -> Result<Found> {
     let complete = |pairs: Vec<Option<Pair>>| {
-        Catalogue::from_pairs(files.names().zip(pairs)).map_err(|errors| incomplete(archive, &errors))
+        // A picture that gives no direction may be one that is missing.
+        let left = left_out(files, pairs.iter().map(Option::is_none));
+        let shown: Vec<String> = (0..files.len()).map(|number| files.shown(number)).collect();
+        Catalogue::from_pairs(shown.iter().map(String::as_str).zip(pairs))
+            .map_err(|errors| incomplete(archive, &errors, left))
     };
     if let Some(path) = &options.table {
         let table = table::read(&read_beside(path)?, limits)
@@ -119,11 +123,15 @@ fn by_light_lists(
         let same = matches!((earlier, &lights), (Ok(a), Ok(b)) if a.pairs == b.pairs);
         if !same {
             let found =
-                format!("{} and {} are two light lists that differ", files.name(*first), files.name(list));
-            return Err(Error::input(found).hint(format!(
-                "import the one that is meant, with the pictures beside it: btf import {:?}",
-                files.name(list)
-            )));
+                format!("{} and {} are two light lists that differ", files.shown(*first), files.shown(list));
+            let hint = match files.is_zipped(*first) || files.is_zipped(list) {
+                true => "unpack the archive to a folder, and import the list there that is meant".to_owned(),
+                false => format!(
+                    "import the one that is meant, with the pictures beside it: btf import {:?}",
+                    files.name(list)
+                ),
+            };
+            return Err(Error::input(found).hint(hint));
         }
     }
     let Some((_, lights)) = read else { return Err(Error::internal("no light list")) };
@@ -165,7 +173,9 @@ fn match_files(
     let mut lines = vec![0; files.len()];
     let (mut different, mut example) = (0, None);
     for (listed, pair, line) in rows {
-        let found = matcher.find(&listed, folder).map_err(|error| error.context(list.display()))?;
+        let found = matcher
+            .find(&listed, folder)
+            .map_err(|error| error.context(format!("{}, line {line}", list.display())))?;
         if pairs[found.number].is_some() {
             let name = files.name(found.number);
             let twice =
@@ -199,11 +209,21 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
     }
     let neighbours = || pictures.iter().zip(pictures.iter().skip(1));
     let name = |number: usize| files.name(number);
-    if let Some((&a, &b)) = neighbours().find(|&(&a, &b)| natural_order(name(a), name(b)).is_eq()) {
+    let small = |number: usize| name(number).to_lowercase();
+    let unsure = |&(&a, &b): &(&usize, &usize)| natural_order(&small(a), &small(b)).is_ge();
+    if let Some((&a, &b)) = neighbours().find(unsure) {
         let found = format!(
             "{list}: lights without names, and {} and {}, of which either may be first",
             name(a),
             name(b)
+        );
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
+    let other_digits = |name: &str| name.contains(|c: char| c.is_numeric() && !c.is_ascii_digit());
+    if let Some(&number) = pictures.iter().find(|&&number| other_digits(name(number))) {
+        let found = format!(
+            "{list}: lights without names, and {}, whose number has digits other than 0 to 9",
+            name(number)
         );
         return Err(Error::input(found).hint("put the names of the pictures into the list"));
     }
@@ -230,8 +250,24 @@ fn has_extension(name: &str, extension: &str) -> bool {
     Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
-fn incomplete(archive: &Path, errors: &CatalogueErrors) -> Error {
-    Error::list(Kind::Input, errors.to_string().lines())
+/// Names of pictures that a note or an error lists.
+const NAMED: usize = 4;
+
+/// What to know of pictures that are left out, as nothing gives their directions; `left` says it of each file.
+pub(super) fn left_out(files: &Files, left: impl Iterator<Item = bool>) -> Option<String> {
+    let names: Vec<String> = (0..files.len())
+        .zip(left)
+        .filter(|&(number, left)| left && is_picture(files.name(number)))
+        .map(|(number, _)| format!("{:?}", files.shown(number)))
+        .collect();
+    let more = if names.len() > NAMED { format!(" and {} more", names.len() - NAMED) } else { String::new() };
+    let shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    (!names.is_empty()).then(|| format!("pictures without directions are left out: {shown}{more}"))
+}
+
+fn incomplete(archive: &Path, errors: &CatalogueErrors, left_out: Option<String>) -> Error {
+    let lines: Vec<String> = errors.to_string().lines().map(str::to_owned).chain(left_out).collect();
+    Error::list(Kind::Input, lines)
         .context(archive.display())
         .hint("expected one picture for each pair of directions")
 }

@@ -32,9 +32,14 @@ pub(super) mod tag {
     pub(crate) const TILE_LENGTH: u16 = 323;
     pub(crate) const TILE_OFFSETS: u16 = 324;
     pub(crate) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(crate) const TRANSFER_FUNCTION: u16 = 301;
     pub(crate) const SUB_IFDS: u16 = 330;
     pub(crate) const EXTRA_SAMPLES: u16 = 338;
     pub(crate) const SAMPLE_FORMAT: u16 = 339;
+    pub(crate) const XMP: u16 = 700;
+    pub(crate) const EXIF_IFD: u16 = 34665;
+    pub(crate) const ICC_PROFILE: u16 = 34675;
+    pub(crate) const COLOUR_SPACE: u16 = 40961;
 }
 
 /// Directories of one file that are looked at.
@@ -211,7 +216,7 @@ impl<'a> Directory<'a> {
     }
 
     /// Another directory of the same file.
-    fn sibling(&self, offset: u64) -> Result<Directory<'a>> {
+    pub(super) fn sibling(&self, offset: u64) -> Result<Directory<'a>> {
         Directory::at(self.bytes, &self.start(), offset)
     }
 
@@ -259,6 +264,14 @@ impl<'a> Directory<'a> {
             return Err(Error::malformed(found, format!("{needed}")).at(fields.reader.position()));
         }
         (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
+    }
+
+    /// The bytes of a tag of any type, as far as they lie in the file; `None` if there is no such tag.
+    pub(super) fn bytes_of(&self, tag: u16) -> Option<&'a [u8]> {
+        let entry = self.entries.iter().find(|entry| entry.tag == tag)?;
+        let len = entry.count.saturating_mul(u64::from(bytes_of(entry.kind).unwrap_or(1)));
+        let rest = self.bytes.get(usize::try_from(entry.at).ok()?..).unwrap_or_default();
+        Some(rest.get(..usize::try_from(len).ok()?).unwrap_or(rest))
     }
 
     /// The only value of a tag, or `default` where there is no such tag.

@@ -1,0 +1,145 @@
+//! Archives that contradict themselves or leave something open: the right reading, a refusal, or a printed note.
+
+use std::fs;
+
+use btfkit_formats::{npy, zip};
+
+use crate::fixture::{btf, fail, succeed};
+use crate::odd_archives::{RIGHT, azimuths, list, png, refused, set, three, told};
+
+/// A zip of these files.
+fn zipped(files: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    let mut writer = zip::ZipWriter::new(Vec::new());
+    for (name, bytes) in files {
+        writer.write_entry(name, bytes).unwrap();
+    }
+    writer.finish().unwrap()
+}
+
+#[test]
+fn the_order_of_names_is_followed_only_where_it_is_one() {
+    let lights = b"3\n1 0 1\n0 1 1\n-1 0 1\n";
+    for names in [["p1.png", "p2.png", "p10.png"], ["P1.png", "p2.png", "q1.png"]] {
+        let mut files = three(names);
+        files.push(("l.lp", lights.to_vec()));
+        let (_folder, root) = set(&files);
+        assert_eq!(azimuths(&root), RIGHT, "{names:?}");
+    }
+    for names in [
+        ["p1.png", "P2.png", "p3.png"],
+        ["a.png", "B.png", "c.png"],
+        ["p1.png", "P1.png", "p3.png"],
+        ["p\u{ff11}.png", "p\u{ff12}.png", "p\u{ff11}\u{ff10}.png"],
+    ] {
+        let mut files = three(names);
+        files.push(("l.lp", lights.to_vec()));
+        let (_folder, root) = set(&files);
+        let error = refused(&root);
+        assert!(error.contains("either may be first") || error.contains("digits other than"), "{error}");
+        assert!(error.contains("put the names of the pictures into the list"), "{error}");
+    }
+}
+
+#[test]
+fn a_line_of_a_list_that_leads_nowhere_is_named() {
+    let mut files = three(["a.png", "b.png", "c.png"]);
+    files.push(("l.lp", list(["a.png", "b.png,", "c.png"]).into_bytes()));
+    let (_folder, root) = set(&files);
+    let error = refused(&root);
+    assert!(error.contains("line 3") && error.contains("\"b.png,\", which is not there"), "{error}");
+    // A list that is cut, or put together of two.
+    for (count, lights) in [("4", 3), ("2", 3)] {
+        fs::write(root.join("l.lp"), list(["a.png", "b.png", "c.png"]).replacen('3', count, 1)).unwrap();
+        let error = refused(&root);
+        let words = format!("line 1 says that there are {count} lights, up to line 4 there are {lights}");
+        assert!(error.contains(&words), "{error}");
+    }
+    fs::write(root.join("l.lp"), list(["\"a.png\"", "b.png", "c.png"]) + "\x1A").unwrap();
+    assert_eq!(azimuths(&root), RIGHT);
+}
+
+#[test]
+fn pictures_that_are_left_out_are_named() {
+    let mut files = three(["tl10 pl0 tv0 pv0.png", "tl20 pl0 tv0 pv0.png", "tl30 pl0 tv0 pv0.png"]);
+    files.push(("tl95 pl0 tv0 pv0.png", png(1)));
+    files.push(("notes.txt", Vec::new()));
+    let (_folder, root) = set(&files);
+    let found = told(&root);
+    assert!(found.contains("2 other files are ignored"), "{found}");
+    assert!(
+        found.contains("pictures without directions are left out:") && found.contains("tl95 pl0"),
+        "{found}"
+    );
+    // One that is missing for it.
+    fs::write(root.join("tl10 pl0 tv10 pv0.png"), png(1)).unwrap();
+    let error = refused(&root);
+    assert!(error.contains("missing: 2") && error.contains("tl95 pl0 tv0 pv0.png"), "{error}");
+}
+
+#[test]
+fn lights_that_are_almost_one_are_told() {
+    let names = ["tl15 pl0 tv0 pv0.png", "tl15.0004 pl0 tv0 pv0.png", "tl60 pl0 tv0 pv0.png"];
+    let (_folder, root) = set(&three(names));
+    let found = told(&root).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(found.contains("theta 15.0004 phi 0.0000 are 0.000400 degrees apart"), "{found}");
+}
+
+#[test]
+fn zips_that_unpack_themselves_are_read() {
+    let (folder, root) = set(&[]);
+    let mut files = three(["a.png", "b.png", "c.png"]);
+    files.push(("l.lp", list(["a.png", "b.png", "c.png"]).into_bytes()));
+    let bytes = zipped(&files);
+    for (name, before) in
+        [("a.zip", &b""[..]), ("b.exe", b"MZ a program"), ("c.zip", b"PK\x07\x08"), ("d.ZIP", &[7; 70_000])]
+    {
+        let path = folder.path().join(name);
+        fs::write(&path, [before, &bytes].concat()).unwrap();
+        assert_eq!(azimuths(&path), RIGHT, "{name}");
+    }
+    assert!(!root.exists());
+}
+
+#[test]
+fn zips_are_named_where_several_contradict_each_other() {
+    let names = ["tl10 pl0 tv0 pv0.png", "tl20 pl0 tv0 pv0.png", "tl30 pl0 tv0 pv0.png"];
+    let bytes = zipped(&three(names));
+    let (_folder, root) = set(&[("one.zip", bytes.clone()), ("two.zip", bytes)]);
+    let error = refused(&root);
+    assert!(error.contains("one.zip: tl10 pl0") && error.contains("two.zip: tl10 pl0"), "{error}");
+    // Lists in a zip: what to do can be done.
+    let mut files = three(["a.png", "b.png", "c.png"]);
+    files.push(("l.lp", list(["a.png", "b.png", "c.png"]).into_bytes()));
+    files.push(("old/l.lp", list(["b.png", "a.png", "c.png"]).into_bytes()));
+    let (_folder, root) = set(&[("one.zip", zipped(&files))]);
+    let error = refused(&root.join("one.zip"));
+    assert!(error.contains("differ") && error.contains("unpack the archive to a folder"), "{error}");
+}
+
+#[test]
+fn names_of_channels_that_do_not_fit_are_refused_by_a_hint_that_helps() {
+    let (folder, _) = set(&[]);
+    let array = folder.path().join("a.npy");
+    let bytes = |channels: u64| {
+        let count = usize::try_from(4 * channels).unwrap();
+        [npy::header([1, 1, 2, 2, channels], btfkit_formats::SampleType::U8), vec![9; count]].concat()
+    };
+    let lights = npy::directions_file(&[btfkit_formats::Direction::from_degrees(15.0, 0.0)]);
+    fs::write(folder.path().join("a.lights.npy"), lights).unwrap();
+    fs::write(&array, bytes(4)).unwrap();
+    let names = folder.path().join("a.channels.txt");
+    for (text, words) in [
+        ("R\nG\nB\n", "3 names of channels in NAME.channels.txt"),
+        ("R\nG\nB\nA\n", "A says how opaque"),
+        ("550nm\n550.0nm\n600nm\n650nm\n", "these two mean the same"),
+    ] {
+        fs::write(&names, text).unwrap();
+        let error = fail(btf().arg("import").arg(&array).arg(folder.path().join("s.zarr")), 65);
+        assert!(error.contains(words) && !error.contains("--order"), "{error}");
+    }
+    fs::remove_file(&names).unwrap();
+    let error = fail(btf().arg("import").arg(&array).arg(folder.path().join("s.zarr")), 65);
+    assert!(error.contains("channel 0, channel 1, channel 2, channel 3, expected one grey"), "{error}");
+    fs::write(&array, bytes(3)).unwrap();
+    succeed(btf().arg("info").arg(&array));
+}

@@ -136,13 +136,16 @@ impl Files {
 
     /// What the first files are that are of a known format that is not read, and what to do about it.
     pub(super) fn foreign(&self) -> Option<String> {
-        let told = |entry: &Entry| {
-            let Place::Plain(path) = &entry.place else { return None };
-            let head = read_head(path, HEAD_BYTES).ok()?;
-            let (what, way_out) = picture::foreign(&entry.name, &head)?;
-            Some(format!("{} is {what}, which is not read: {way_out}", entry.name))
+        let told = |number: usize| {
+            let head = match &self.entries.get(number)?.place {
+                Place::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
+                Place::Zipped { .. } => self.bytes(number).ok()?,
+            };
+            let (what, way_out) = picture::foreign(self.name(number), &head)?;
+            self.release(number);
+            Some(format!("{} is {what}, which is not read: {way_out}", self.shown(number)))
         };
-        self.entries.iter().take(SNIFFED).find_map(told)
+        (0..self.len().min(SNIFFED)).find_map(told)
     }
 
     /// The light list that was named.
@@ -263,8 +266,8 @@ pub(super) fn regular(path: &Path) -> Result<fs::File> {
     fs::File::open(path).map_err(|error| Error::io("read", path, error))
 }
 
-/// Whether a file is a zip by its first bytes (an empty zip begins with its end record), or by its last ones where its name
-/// says that it may be one that unpacks itself.
+/// Whether a file is a zip by its first bytes (an empty zip begins with its end record), or by its last ones where its
+/// name says that it may be one that unpacks itself.
 fn is_zip(path: &Path) -> Result<bool> {
     let head = read_head(path, 4)?;
     if head == *b"PK\x03\x04" || head == *END_OF_ZIP {

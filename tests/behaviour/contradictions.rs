@@ -76,6 +76,44 @@ fn pictures_that_are_left_out_are_named() {
     assert!(error.contains("missing: 2") && error.contains("tl95 pl0 tv0 pv0.png"), "{error}");
 }
 
+/// A PNG that states a gamma.
+fn with_gamma(png: &[u8], gamma: u32) -> Vec<u8> {
+    let chunk = [&b"gAMA"[..], &gamma.to_be_bytes()].concat();
+    let whole = [&4u32.to_be_bytes()[..], &chunk, &crc32fast::hash(&chunk).to_be_bytes()].concat();
+    [&png[..33], &whole, &png[33..]].concat()
+}
+
+#[test]
+fn colours_that_are_not_srgb_are_stated_and_not_mixed() {
+    let names = ["tl10 pl0 tv0 pv0.png", "tl20 pl0 tv0 pv0.png"];
+    let of = |gammas: [u32; 2]| {
+        let files: Vec<(&str, Vec<u8>)> =
+            names.into_iter().zip(gammas).map(|(name, gamma)| (name, with_gamma(&png(10), gamma))).collect();
+        set(&files)
+    };
+    let words = |root: &std::path::Path| told(root).split_whitespace().collect::<Vec<_>>().join(" ");
+    let stated =
+        "the gamma 1.00000 (gAMA), which the pictures state, is not applied: samples are taken as sRGB";
+    let (_folder, root) = of([100_000; 2]);
+    assert!(words(&root).contains(stated), "{}", words(&root));
+    let (_folder, root) = of([45_455; 2]);
+    assert!(!words(&root).contains("gAMA"));
+    for (gammas, told) in [
+        (
+            [45_455, 100_000],
+            "states the gamma 1.00000 (gAMA) for its colours, expected sRGB or nothing like the first",
+        ),
+        (
+            [100_000, 45_455],
+            "states sRGB or nothing for its colours, expected the gamma 1.00000 (gAMA) like the first",
+        ),
+    ] {
+        let (_folder, root) = of(gammas);
+        let error = refused(&root);
+        assert!(error.contains(told) && error.contains("tl20 pl0"), "{error}");
+    }
+}
+
 #[test]
 fn lights_that_are_almost_one_are_told() {
     let names = ["tl15 pl0 tv0 pv0.png", "tl15.0004 pl0 tv0 pv0.png", "tl60 pl0 tv0 pv0.png"];
@@ -107,6 +145,10 @@ fn zips_are_named_where_several_contradict_each_other() {
     let (_folder, root) = set(&[("one.zip", bytes.clone()), ("two.zip", bytes)]);
     let error = refused(&root);
     assert!(error.contains("one.zip: tl10 pl0") && error.contains("two.zip: tl10 pl0"), "{error}");
+    // Formats that are not read are called by their names in zips, too.
+    let webp = ("tl10 pl0 tv0 pv0.webp", b"RIFF\x10\0\0\0WEBPVP8 and more".to_vec());
+    let (_folder, root) = set(&[("one.zip", zipped(&[webp]))]);
+    assert!(refused(&root.join("one.zip")).contains("pv0.webp is a WebP picture"));
     // Lists in a zip: what to do can be done.
     let mut files = three(["a.png", "b.png", "c.png"]);
     files.push(("l.lp", list(["a.png", "b.png", "c.png"]).into_bytes()));

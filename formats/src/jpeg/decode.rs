@@ -50,7 +50,14 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
             }
             Cow::Owned(plain)
         }
-        Arrangement::ScatteredScans(grid) => Cow::Owned(interleaved(picture, &grid)?),
+        Arrangement::ScatteredScans(mut grid) => {
+            if let Some((id, _)) =
+                grid.components.first_mut().filter(|_| !walked.rgb && !walked.red_ids.is_empty())
+            {
+                *id = NO_RED;
+            }
+            Cow::Owned(interleaved(picture, &grid)?)
+        }
     };
     let colours = if header.channels == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
     let options = DecoderOptions::default()
@@ -76,8 +83,12 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
 /// An Adobe segment that says of three components that they are red, green and blue.
 const ADOBE_RGB: &[u8] = b"\xFF\xEE\0\x0EAdobe\0\x64\0\0\0\0\0";
 
-/// The picture with no more than one word about what its components are, that which counts: Adobe segments become ones of no
-/// name, which decoders step over, ids that say RGB of what is YCbCr say it no longer, and RGB gets a segment of our own.
+/// The id that R becomes where it is none of red.
+const NO_RED: u8 = b'Y';
+
+/// The picture with no more than one word about what its components are, that which counts: Adobe segments become ones
+/// of no name, which decoders step over, ids that say RGB of what is YCbCr say it no longer, and RGB gets a segment of
+/// our own.
 fn with_colours<'a>(picture: &'a [u8], walked: &Walked) -> Cow<'a, [u8]> {
     let Walked { adobe, red_ids, rgb, .. } = walked;
     if adobe.is_empty() && red_ids.is_empty() && !rgb {
@@ -85,7 +96,7 @@ fn with_colours<'a>(picture: &'a [u8], walked: &Walked) -> Cow<'a, [u8]> {
     }
     let mut plain = picture.to_vec();
     let names = adobe.iter().map(|&at| (at, 0));
-    let ids = red_ids.iter().map(|&at| (at, b'Y')).filter(|_| !rgb);
+    let ids = red_ids.iter().map(|&at| (at, NO_RED)).filter(|_| !rgb);
     for (at, byte) in names.chain(ids) {
         if let Some(place) = plain.get_mut(at) {
             *place = byte;

@@ -140,8 +140,8 @@ fn skip(reader: &mut Reader<'_>, code: u8, at: usize) -> Result<()> {
     }
 }
 
-/// Whether three components are red, green and blue: a file that is JFIF is YCbCr (T.871, 6.1) whatever stands in it, else an
-/// Adobe segment says it, else the components' ids do. (Other ids and transforms are taken for YCbCr.)
+/// Whether three components are red, green and blue: a file that is JFIF is YCbCr (T.871, 6.1) whatever stands in it,
+/// else an Adobe segment says it, else the components' ids do. (Other ids and transforms are taken for YCbCr.)
 fn is_rgb(is_jfif: bool, adobe_transform: Option<u8>, ids: impl Iterator<Item = u8>) -> bool {
     match adobe_transform {
         _ if is_jfif => false,

@@ -140,8 +140,8 @@ impl<'a> Directory<'a> {
         }
     }
 
-    /// Itself, if no other directory holds more pixels, or as many and does not say that it is a version of another: some
-    /// programs put a thumbnail first and say nothing of it.
+    /// Itself, if no other directory holds more pixels, or as many and does not say that it is a version of another:
+    /// some programs put a thumbnail first and say nothing of it.
     fn unless_rivalled(self, others: &[Directory<'_>]) -> Result<Directory<'a>> {
         let (width, height) = self.size()?;
         let pixels = width.saturating_mul(height);

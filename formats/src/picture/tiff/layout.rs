@@ -297,7 +297,8 @@ fn interpretation(directory: &Directory<'_>, stored: u64) -> Result<(bool, bool)
     }
 }
 
-/// How the picture asks to be turned. Cameras put it into the first directory, whichever is the picture; others into XMP.
+/// How the picture asks to be turned. Cameras put it into the first directory, whichever is the picture; others into
+/// XMP.
 fn stated_orientation(directory: &Directory<'_>, bytes: &[u8]) -> Result<u64> {
     if directory.list(tag::ORIENTATION)?.is_some() {
         return directory.number(tag::ORIENTATION, None);

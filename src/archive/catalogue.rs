@@ -17,6 +17,11 @@ pub(super) struct Found {
     pub(super) assumptions: Vec<String>,
 }
 
+/// What to do where names tell nothing.
+const NAMES: &str = "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern \
+     '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' says where the angles stand, --table FILE.csv lists them, \
+     `btf import --help` explains";
+
 const FRONTAL: &str = "there are no view directions: one frontal view";
 
 /// Sorts out the files of an archive.
@@ -58,10 +63,7 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
     }
     if let Some(name) = files.names().find(|name| ubo2003::half_read(name)) {
         let found = format!("{name}: digits that belong to no label are left over behind an angle");
-        return Err(Error::input(found).context(archive.display()).hint(
-            "angles have a decimal point (tl7.5); --pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}.png' says what \
-             digits do not matter, --table FILE.csv lists the angles",
-        ));
+        return Err(Error::input(found).context(archive.display()).hint(for_digits_left(name)));
     }
     let pairs: Vec<Option<Pair>> = files.names().map(of_ubo2003_name).collect();
     if pairs.iter().any(Option::is_some) {
@@ -75,12 +77,29 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         if let Some(foreign) = files.foreign() {
             return Error::input(foreign).context(archive.display());
         }
-        Error::from(error).context(archive.display()).hint(
-            "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' \
-             says where the angles stand, --table FILE.csv lists them, `btf import --help` explains",
-        )
+        let counted = files.names().find(|name| without_counter(name).is_some());
+        Error::from(error).context(archive.display()).hint(counted.map_or(NAMES.to_owned(), for_digits_left))
     })?;
     by_pattern(&pattern, files, complete)
+}
+
+/// What to do about a name with digits behind an angle, which may be a fraction or a counter.
+fn for_digits_left(name: &str) -> String {
+    let counter = match without_counter(name) {
+        Some(pattern) => format!("if the last digits only count: --pattern '{pattern}'"),
+        None => "--pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}' says what digits do not matter"
+            .to_owned(),
+    };
+    format!("angles have a decimal point (tl7.5); {counter}; --table FILE.csv lists the angles")
+}
+
+/// The pattern of a name that ends in a counter, if there is one when that is left out.
+fn without_counter(name: &str) -> Option<String> {
+    let (stem, ending) = name.rsplit_once('.')?;
+    let before = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let head = before.strip_suffix(['_', '-', ' ']).filter(|_| before.len() < stem.len())?;
+    let pattern = named::recognise([format!("{head}.{ending}").as_str()]).ok()?;
+    Some(format!("{pattern}{}{{n}}", &before[head.len()..]))
 }
 
 fn by_pattern(
@@ -168,7 +187,8 @@ fn match_files(
     rows: Vec<(Listed<'_>, Pair, usize)>,
 ) -> Result<(Vec<Option<Pair>>, Option<String>)> {
     let folder = list.parent().unwrap_or(Path::new(""));
-    let matcher = Matcher::new(files.names());
+    let shown = |number| files.shown(number);
+    let matcher = Matcher::new(files.names(), &shown);
     let mut pairs = vec![None; files.len()];
     let mut lines = vec![0; files.len()];
     let (mut different, mut example) = (0, None);
@@ -177,7 +197,7 @@ fn match_files(
             .find(&listed, folder)
             .map_err(|error| error.context(format!("{}, line {line}", list.display())))?;
         if pairs[found.number].is_some() {
-            let name = files.name(found.number);
+            let name = files.shown(found.number);
             let twice =
                 format!("{}: the lines {} and {line} mean {name}", list.display(), lines[found.number]);
             return Err(Error::input(twice).hint("each picture has one line"));

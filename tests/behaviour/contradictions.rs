@@ -115,6 +115,30 @@ fn colours_that_are_not_srgb_are_stated_and_not_mixed() {
 }
 
 #[test]
+fn a_counter_behind_an_angle_is_refused_with_the_pattern_that_reads_it() {
+    for names in [
+        [
+            "00000 tl10 pl0 tv0 pv0_001.png",
+            "00001 tl20 pl0 tv0 pv0_002.png",
+            "00002 tl30 pl0 tv0 pv0_003.png",
+        ],
+        ["tl10_pl0-1.png", "tl20_pl0-2.png", "tl30_pl0-3.png"],
+        ["set/l10_0_v0_0 07.png", "set/l20_0_v0_0 08.png", "set/l30_0_v0_0 09.png"],
+    ] {
+        let (folder, root) = set(&three(names));
+        let error = refused(&root);
+        let pattern = error.split("--pattern '").nth(1).and_then(|rest| rest.split('\'').next()).unwrap();
+        let store = folder.path().join("s.zarr");
+        succeed(btf().arg("import").args([&root, &store]).args(["--pattern", pattern]));
+        assert!(succeed(btf().arg("info").arg(&store)).contains("theta 10.0 to 30.0"), "{pattern}");
+    }
+    let (_folder, root) =
+        set(&three(["tl7,5 pl0 tv0 pv0.png", "tl15 pl0 tv0 pv0.png", "tl30 pl0 tv0 pv0.png"]));
+    let error = refused(&root);
+    assert!(error.contains("tl7,5") && !error.contains("only count"), "{error}");
+}
+
+#[test]
 fn lights_that_are_almost_one_are_told() {
     let names = ["tl15 pl0 tv0 pv0.png", "tl15.0004 pl0 tv0 pv0.png", "tl60 pl0 tv0 pv0.png"];
     let (_folder, root) = set(&three(names));
@@ -145,6 +169,12 @@ fn zips_are_named_where_several_contradict_each_other() {
     let (_folder, root) = set(&[("one.zip", bytes.clone()), ("two.zip", bytes)]);
     let error = refused(&root);
     assert!(error.contains("one.zip: tl10 pl0") && error.contains("two.zip: tl10 pl0"), "{error}");
+    let mut files = three(["a.png", "b.png", "c.png"]);
+    let other = zipped(&files);
+    files.push(("l.lp", list(["a.png", "b.png", "c.png"]).into_bytes()));
+    let (_folder, root) = set(&[("one.zip", zipped(&files)), ("two.zip", other)]);
+    let error = refused(&root);
+    assert!(error.contains("there 2 times") && error.contains("two.zip: a.png"), "{error}");
     // Formats that are not read are called by their names in zips, too.
     let webp = ("tl10 pl0 tv0 pv0.webp", b"RIFF\x10\0\0\0WEBPVP8 and more".to_vec());
     let (_folder, root) = set(&[("one.zip", zipped(&[webp]))]);

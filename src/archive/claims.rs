@@ -19,7 +19,8 @@ pub(super) fn require_channels(contents: &Contents) -> Result<()> {
     let names = &contents.channels;
     let mut meanings: Vec<(String, &str)> = names.iter().map(|name| (meaning(name), name.as_str())).collect();
     meanings.sort_unstable();
-    if let Some([(_, first), (_, second)]) = meanings.array_windows().find(|[a, b]| a.0 == b.0) {
+    let mut neighbours = meanings.iter().zip(meanings.iter().skip(1));
+    if let Some(((_, first), (_, second))) = neighbours.find(|(a, b)| a.0 == b.0) {
         return Err(Error::input(format!(
             "got the channels {first:?} and {second:?}, expected each channel once: these two mean the same"
         ))

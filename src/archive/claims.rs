@@ -44,7 +44,10 @@ pub(super) fn require_channels(contents: &Contents) -> Result<()> {
 fn meaning(name: &str) -> String {
     let bare = name.trim().to_lowercase();
     let number = bare.strip_suffix("nm").unwrap_or(&bare).trim().replace(',', ".").parse::<f64>().ok();
-    match wavelength_nm(&bare).or(number.filter(|number| number.is_finite())) {
+    match wavelength_nm(name.trim())
+        .or_else(|| wavelength_nm(&bare))
+        .or(number.filter(|number| number.is_finite()))
+    {
         // To a thousandth of a nanometre: 0.55um is 550.0000000000001 nm.
         Some(number) => format!("{number:.3}"),
         None => bare,

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::mapped::{is_temporary, special};
 use super::metadata::read_object;
 use super::{enlarged, is_lock, measurement, model};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_loop};
 
 /// Bytes that tell one file from another.
 const HEAD_BYTES: u64 = 4096;
@@ -41,10 +41,29 @@ enum Use {
     OldZarr,
     /// It can be imported.
     Import,
+    /// Neither a file nor a folder: nothing can be there to be read.
+    Special,
     /// Nothing that this program knows.
     Nothing,
     /// A sentence.
     Advice(&'static str),
+}
+
+/// Checks that a path is no link that leads nowhere.
+///
+/// # Errors
+/// [`crate::Kind::Missing`], with what it leads to.
+pub fn expect_no_dead_link(path: &Path) -> Result<()> {
+    // With a slash behind it, a link would be followed.
+    let path: std::path::PathBuf = path.components().collect();
+    let (Ok(to), Err(error)) = (path.read_link(), std::fs::metadata(&path)) else { return Ok(()) };
+    let what = match error.kind() {
+        std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => "where nothing is".to_owned(),
+        _ if is_loop(&error) => "and leads back to itself".to_owned(),
+        _ => format!("where nothing can be read: {error}"),
+    };
+    Err(Error::missing(format!("{} is a link to {}, {what}", path.display(), to.display()))
+        .hint("mend the link, or name what it was to lead to"))
 }
 
 /// What lies at a path that has no `zarr.json` of ours; `None` for nothing, or an empty folder.
@@ -61,7 +80,7 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
         return of_folder(path);
     }
     if let Some(special) = special(&data) {
-        return Ok(Some(Other { what: special.to_owned(), use_it: Use::Nothing }));
+        return Ok(Some(Other { what: special.to_owned(), use_it: Use::Special }));
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
@@ -163,6 +182,7 @@ impl Other {
             }
             Use::OldZarr => error.hint("make the store with this program, from the archive"),
             Use::Advice(advice) => error.hint(advice),
+            Use::Special => Error::missing(error.to_string()).hint("name the store itself"),
             Use::Nothing => error,
         }
     }

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
-use crate::picture::{Encoding, Picture, stream};
+use crate::picture::{Encoding, Ending, Picture, stream};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
+use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
 use crate::store::output::Made;
@@ -77,8 +78,18 @@ pub struct PlaneOptions {
     pub jitter: Option<u32>,
 }
 
-/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size, and whether
-/// it was there already.
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Rows and columns.
+    pub size: Size,
+    /// Whether it was there already.
+    pub made: Made,
+    /// What the format does not hold, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only.
 ///
 /// # Errors
 /// A window that does not lie within the plane, a size that the format or the memory does not hold, and those of
@@ -89,10 +100,10 @@ pub fn run(
     output: &Path,
     encoding: Encoding,
     context: &Context<'_>,
-) -> Result<(Size, Made)> {
+) -> Result<Report> {
     let fits = |size: Size| {
         encoding.check_size(size)?;
-        encoding.check_memory(size, WRITING_BYTES, context.memory_bytes)
+        encoding.check_memory(size, WRITING_BYTES, context.memory())
     };
     options.window.map_or(Ok(()), |window| fits(window.size))?;
     let mut scene = Scene::open(options, context)?;
@@ -100,19 +111,23 @@ pub fn run(
     let size = scene.size();
     fits(size)?;
     let writing = encoding.memory_bytes(size) + WRITING_BYTES;
-    let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
+    let (in_flight, bands) = scene.bands_in_flight("a picture", writing, context)?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
+    let beyond = Beyond::default();
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
         stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
+            if encoding.ending != Ending::Exr {
+                beyond.count_pixels(scene.meaning(), pixels);
+            }
             context.progress.advance(1);
             Ok(())
         })
     })?;
     context.progress.end();
-    Ok((size, made))
+    Ok(Report { size, made, notes: beyond.notes() })
 }
 
 /// The rows of a picture, out of bands.

@@ -6,7 +6,7 @@ use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
 use btfkit::store::codec::Chain;
 use btfkit::store::measurement::Description;
-use btfkit::store::recognise::expect_no_dead_link;
+use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
 use clap::Args;
 
@@ -74,7 +74,7 @@ impl Import {
         if let Some(absent) =
             self.paths.iter().find(|path| !(path.exists() || self.into.is_none() && is_store(path)))
         {
-            expect_no_dead_link(absent)?;
+            expect_readable(absent)?;
             let error = Error::missing(format!("{}: no such archive", absent.display()));
             return Err(
                 if self.into.is_none() && self.paths.len() > 1 && Some(absent) == self.paths.last() {

@@ -73,8 +73,13 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
             &old[..SHOWN],
             &new[..SHOWN]
         ),
-        _ => format!("{place} was {old}, now {new}"),
+        _ => format!("{place} was {}, now {}", shown(old), shown(new)),
     })
+}
+
+/// A setting; one that is null was left to the program.
+fn shown(value: &Value) -> String {
+    if value.is_null() { "not given".to_owned() } else { value.to_string() }
 }
 
 /// Characters of a digest that are shown.

@@ -3,8 +3,8 @@
 
 use std::sync::Mutex;
 
-use btfkit_formats::SampleType;
 use btfkit_formats::picture::wavelength_nm;
+use btfkit_formats::{SampleType, Samples};
 
 use crate::color::Remarkable;
 use crate::picture::Meaning;
@@ -14,6 +14,15 @@ use crate::words::counted;
 /// Values that display codes, from black to white, do not hold. They are counted by whoever encodes them.
 #[derive(Debug, Default)]
 pub struct Beyond(Mutex<Remarkable>);
+
+/// How many samples are not finite.
+pub(crate) fn not_finite(samples: &Samples) -> u64 {
+    match samples {
+        Samples::U8(_) | Samples::U16(_) => 0,
+        Samples::F16(list) => list.iter().filter(|sample| !sample.is_finite()).count() as u64,
+        Samples::F32(list) => list.iter().filter(|sample| !sample.is_finite()).count() as u64,
+    }
+}
 
 impl Beyond {
     /// Counts linear values, in which 1 is white.
@@ -28,6 +37,12 @@ impl Beyond {
         *self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += found;
     }
 
+    /// Counts samples that are not finite, which count as black before they get here.
+    pub fn count_not_finite(&self, count: u64) {
+        let mut found = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        found.not_finite += count;
+    }
+
     /// Counts pixels, if they are light.
     pub fn count_pixels(&self, meaning: Meaning, pixels: &[[f32; 3]]) {
         if meaning == Meaning::Linear {
@@ -36,12 +51,12 @@ impl Beyond {
     }
 
     /// What became of them, a sentence; none where there are none.
-    pub fn notes(self) -> Vec<String> {
-        let found = self.0.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    pub fn notes(&self) -> Vec<String> {
+        let found = *self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let parts = [
             (found.clipped, "above white (1), stored as white"),
             (found.negative, "below 0, stored as black"),
-            (found.not_finite, "not finite"),
+            (found.not_finite, "not finite, stored as black"),
         ];
         let parts = parts.into_iter().filter(|&(count, _)| count > 0);
         let parts: Vec<String> =
@@ -113,7 +128,7 @@ mod tests {
         let beyond = Beyond::default();
         beyond.count_pixels(Meaning::Linear, &[[2.0, -1.0, f32::NAN], [1.5, 0.0, 0.0]]);
         let told = "not held: 2 values above white (1), stored as white; 1 value below 0, stored as black; \
-            1 value not finite";
+            1 value not finite, stored as black";
         assert_eq!(beyond.notes(), [told]);
     }
 }

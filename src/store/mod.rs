@@ -316,7 +316,7 @@ impl Store {
     /// # Errors
     /// As [`Store::expect`].
     pub fn expect_one_of(&self, kinds: &[&str]) -> Result<Map<String, Value>> {
-        recognise::expect_no_dead_link(&self.path)?;
+        recognise::expect_readable(&self.path)?;
         let Some(found) = self.attributes()? else {
             let other = match self.metadata_path("").exists() {
                 true => Some(recognise::foreign(&self.path)?),

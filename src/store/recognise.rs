@@ -41,22 +41,32 @@ enum Use {
     OldZarr,
     /// It can be imported.
     Import,
-    /// Neither a file nor a folder: nothing can be there to be read.
-    Special,
     /// Nothing that this program knows.
     Nothing,
     /// A sentence.
     Advice(&'static str),
 }
 
-/// Checks that a path is no link that leads nowhere.
+/// Checks that a path is no link that leads nowhere, and no pipe, socket or device: nothing can be there to be read.
 ///
 /// # Errors
-/// [`crate::Kind::Missing`], with what it leads to.
-pub fn expect_no_dead_link(path: &Path) -> Result<()> {
+/// [`crate::Kind::Missing`], with what it is, or leads to.
+pub fn expect_readable(path: &Path) -> Result<()> {
     // With a slash behind it, a link would be followed.
     let path: std::path::PathBuf = path.components().collect();
-    let (Ok(to), Err(error)) = (path.read_link(), std::fs::metadata(&path)) else { return Ok(()) };
+    let error = match std::fs::metadata(&path) {
+        Ok(data) => {
+            return match special(&data).filter(|_| !data.is_dir()) {
+                Some(what) => {
+                    Err(Error::missing(format!("{} is {what}, expected a file or a folder", path.display()))
+                        .hint("copy its contents into a file, and name that"))
+                }
+                None => Ok(()),
+            };
+        }
+        Err(error) => error,
+    };
+    let Ok(to) = path.read_link() else { return Ok(()) };
     let what = match error.kind() {
         std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => "where nothing is".to_owned(),
         _ if is_loop(&error) => "and leads back to itself".to_owned(),
@@ -80,7 +90,7 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
         return of_folder(path);
     }
     if let Some(special) = special(&data) {
-        return Ok(Some(Other { what: special.to_owned(), use_it: Use::Special }));
+        return Ok(Some(Other { what: special.to_owned(), use_it: Use::Nothing }));
     }
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
@@ -130,6 +140,7 @@ fn of_folder(path: &Path) -> Result<Option<Other>> {
     }
     let entries = std::fs::read_dir(path).map_err(|error| Error::io("list", path, error))?;
     let mut is_empty = true;
+    let mut has_arrays = false;
     for entry in entries.take(MOST_ENTRIES) {
         let entry = entry.map_err(|error| Error::io("list", path, error))?.path();
         // What a killed writer left of its first file is nothing.
@@ -137,10 +148,15 @@ fn of_folder(path: &Path) -> Result<Option<Other>> {
             continue;
         }
         is_empty = false;
+        has_arrays |= entry.join("zarr.json").is_file();
         let ending = entry.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         if ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr"].contains(&ending.as_str()) {
             return Ok(Some(Other { what: "a folder of pictures".to_owned(), use_it: Use::Import }));
         }
+    }
+    if has_arrays {
+        let what = "a store that has lost its zarr.json".to_owned();
+        return Ok(Some(Other { what, use_it: Use::Advice("make it again under another name") }));
     }
     let folder = || Other { what: "a folder without a zarr.json".to_owned(), use_it: Use::Import };
     Ok((!is_empty).then(folder))
@@ -182,7 +198,6 @@ impl Other {
             }
             Use::OldZarr => error.hint("make the store with this program, from the archive"),
             Use::Advice(advice) => error.hint(advice),
-            Use::Special => Error::missing(error.to_string()).hint("name the store itself"),
             Use::Nothing => error,
         }
     }

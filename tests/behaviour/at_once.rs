@@ -75,7 +75,8 @@ fn of_two_that_make_the_same_one_writes_it_and_the_other_finds_it_done() {
             let output = folder.path().join(name);
             let [mut a, mut b] = [(); 2].map(|()| command(&arguments(0), &output));
             if force {
-                [&mut a, &mut b].map(|command| command.arg("--force"));
+                a.arg("--force");
+                b.arg("--force");
             }
             for (code, told) in both([&mut a, &mut b]) {
                 assert_eq!(code, Some(0), "{name}: {told}");
@@ -97,7 +98,8 @@ fn of_two_that_make_different_ones_the_second_is_told_and_nothing_is_mixed() {
             let output = folder.path().join(name);
             let [mut a, mut b] = [0, 1].map(|variant| command(&arguments(variant), &output));
             if force {
-                [&mut a, &mut b].map(|command| command.arg("--force"));
+                a.arg("--force");
+                b.arg("--force");
             }
             let ended = both([&mut a, &mut b]);
             let found = made(folder.path());

@@ -119,7 +119,9 @@ pub fn copy(from: &Path, to: &Path) {
 pub fn assert_same(first: &Path, second: &Path) {
     let made = |store: &Path| {
         let mut files = tree(store);
-        ["model-path", "measurement-path"].map(|name| files.remove(Path::new(name)));
+        for name in ["model-path", "measurement-path"] {
+            files.remove(Path::new(name));
+        }
         files
     };
     let (a, b) = (made(first), made(second));

@@ -82,7 +82,7 @@ fn what_is_finished_is_found_done_where_nothing_can_be_written() {
         "verify sample.model.zarr",
         "verify big.zarr",
         "verify pyramid.dzi",
-        "compare sample.zarr sample.model.zarr",
+        "compare sample.model.zarr sample.zarr",
     ] {
         let mut command = as_user().unwrap();
         words(&mut command, done);
@@ -169,7 +169,7 @@ fn names_that_are_no_text_are_used_as_they_are() {
     {
         succeed(btf().arg(command).args(stores).arg("--json"));
     }
-    succeed(btf().arg("compare").args([&first, &model]));
+    succeed(btf().arg("compare").args([&model, &first]));
     succeed(
         btf()
             .arg("image")
@@ -241,7 +241,7 @@ fn of_a_measurement_that_changed_it_is_said_which_and_what_to_run() {
     let mut cluster = btf();
     cluster.arg("cluster").args([&measurement, &model]);
     let mut compare = btf();
-    compare.arg("compare").args([&measurement, &model]);
+    compare.arg("compare").args([&model, &measurement]);
     for command in [&mut image, &mut again, &mut cluster, &mut compare] {
         let told = fail(command, 65);
         let line = format!("{} is not what {} was made of", measurement.display(), model.display());

@@ -170,7 +170,12 @@ impl Curve {
 
 /// A ratio for people: 1:7.3 or 1:1203.
 pub fn ratio_text(ratio: f64) -> String {
-    if ratio < 10.0 { format!("1:{ratio:.1}") } else { format!("1:{ratio:.0}") }
+    let decimals = match ratio {
+        _ if ratio < 0.1 => 3,
+        _ if ratio < 10.0 => 1,
+        _ => 0,
+    };
+    format!("1:{ratio:.decimals$}")
 }
 
 #[cfg(test)]

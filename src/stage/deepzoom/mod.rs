@@ -26,7 +26,6 @@ use crate::run::recipe::METHOD;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
-use crate::stage::loss::Beyond;
 use crate::store::mapped::write_file;
 use cascade::{Cascade, Sink};
 use place::Place;
@@ -185,7 +184,6 @@ impl Plan {
         self.place.begin(&self.recipe, context)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
-        let beyond = Beyond::default();
         let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };
         if !self.is_whole() {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
@@ -194,7 +192,7 @@ impl Plan {
             read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
                 (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
-                    beyond.count_pixels(self.scene.meaning(), &pixels);
+                    self.scene.beyond().count_pixels(self.scene.meaning(), &pixels);
                     cascade.push(&self.pyramid, &pixels, &tiles)
                 })
             })?;
@@ -212,7 +210,7 @@ impl Plan {
             levels: self.pyramid.top() + 1,
             tiles_found: found,
             tiles_written: total - found,
-            notes: beyond.notes(),
+            notes: self.scene.beyond().notes(),
         })
     }
 

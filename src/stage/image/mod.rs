@@ -18,7 +18,7 @@ use crate::store::output::Made;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
-use btfkit_formats::Direction;
+use btfkit_formats::{Direction, Samples};
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
 pub(crate) use scene::{model_of, of_stage, plane_rows};
@@ -114,20 +114,19 @@ pub fn run(
     let (in_flight, bands) = scene.bands_in_flight("a picture", writing, context)?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
-    let beyond = Beyond::default();
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
         stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
             if encoding.ending != Ending::Exr {
-                beyond.count_pixels(scene.meaning(), pixels);
+                scene.beyond().count_pixels(scene.meaning(), pixels);
             }
             context.progress.advance(1);
             Ok(())
         })
     })?;
     context.progress.end();
-    Ok(Report { size, made, notes: beyond.notes() })
+    Ok(Report { size, made, notes: scene.beyond().notes() })
 }
 
 /// The rows of a picture, out of bands.
@@ -166,7 +165,8 @@ pub fn of_measurement(
 ) -> Result<Picture> {
     let appearance = measured_appearance(measurement, view, light);
     let decoder = measurement.description().decoder()?;
-    Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, context)?))
+    let beyond = Beyond::default();
+    Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, &beyond, context)?))
 }
 
 /// How a measurement is mixed under a light, seen from a view.
@@ -182,6 +182,7 @@ fn mixed(
     appearance: &Appearance,
     decoder: &Decoder,
     window: Window,
+    beyond: &Beyond,
     context: &Context<'_>,
 ) -> Result<Vec<[f32; 3]>> {
     let description = measurement.description();
@@ -196,11 +197,19 @@ fn mixed(
             let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
             let samples = measurement.read_reflectance(view, band)?;
             let to = &mut pixels[top * window.size.width..];
+            let floats = matches!(samples, Samples::F16(_) | Samples::F32(_));
+            let mut not_finite = 0;
             for (at, sum) in (0..samples.len()).step_by(texel).zip(to) {
                 for &(_, light, weight) in appearance.terms.iter().filter(|(v, ..)| *v == view) {
+                    if floats {
+                        let first = at + light * channels;
+                        let finite = |channel| samples.value(channel).is_some_and(f64::is_finite);
+                        not_finite += (first..first + channels).filter(|&channel| !finite(channel)).count();
+                    }
                     add(sum, weight, decoder.rgb(&samples, at + light * channels));
                 }
             }
+            beyond.count_not_finite(not_finite as u64);
         }
     }
     Ok(pixels.into_iter().map(|p| p.map(|value| value as f32)).collect())

@@ -18,6 +18,7 @@ use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::{measurement_name, open_measurement_of};
+use crate::stage::loss::Beyond;
 use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
@@ -41,6 +42,7 @@ pub struct Scene {
     area: Area,
     /// What tells its pixels apart from those of another source.
     recipe: Value,
+    beyond: Beyond,
 }
 
 enum Source {
@@ -151,12 +153,17 @@ impl Scene {
         if options.values != Values::Model {
             recipe["values"] = json!("measured");
         }
-        Ok(Self { source, area, recipe })
+        Ok(Self { source, area, recipe, beyond: Beyond::default() })
     }
 
     /// Rows and columns.
     pub fn size(&self) -> Size {
         self.area.size
+    }
+
+    /// What of it display values do not hold, as far as it has been read; whoever encodes rows counts them here too.
+    pub fn beyond(&self) -> &Beyond {
+        &self.beyond
     }
 
     /// What its values mean.
@@ -204,7 +211,7 @@ impl Scene {
         let window = area.within_first_quadrant().ok_or_else(|| Error::internal("a window below 0"))?;
         let pixels = match &self.source {
             Source::Measurement { measurement, appearance, decoder } => {
-                Pixels::Own(mixed(measurement, appearance, decoder, window, context)?)
+                Pixels::Own(mixed(measurement, appearance, decoder, window, &self.beyond, context)?)
             }
             Source::Tile(picture) => Pixels::Own(picture.part(window).pixels),
             Source::Clusters { enlarged, colors } => {
@@ -402,7 +409,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         "window": [area.x, area.y, area.size.width, area.size.height],
         "values": if options.values == Values::Model { "model" } else { "measured" },
     });
-    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe })
+    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe, beyond: Beyond::default() })
 }
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {

@@ -135,12 +135,15 @@ pub fn contrast(statistics: &Statistics) -> Check {
         .map(|(view, light)| Place::image(view, light))
         .collect();
     let all = statistics.images.len();
+    let nothing = plain.len() == all;
+    // Single black ones are told as such.
+    let is_black = |place: &Place| statistics.is_black(place.view.unwrap_or(0), place.light.unwrap_or(0));
+    let plain: Vec<Place> = plain.into_iter().filter(|place| nothing || !is_black(place)).collect();
     let share = plain.len() as f64 / all.max(1) as f64;
     let detail = format!("{} of {} of one brightness throughout", plain.len(), counted(all, "image"));
     if plain.is_empty() {
         return Check::done(CONTRAST, detail, 0.0, Vec::new());
     }
-    let nothing = plain.len() == all;
     let message = if nothing {
         "no image shows anything: each is of one brightness throughout".to_owned()
     } else {

@@ -4,11 +4,11 @@
 //! The file holds the way from the folder of the store to its origin, so that both can be moved together. It is no part
 //! of what is made: the same store in another place has the same bytes in all other files.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use super::mapped::write_file;
+use super::mapped::{open, write_file};
 use crate::error::{Error, Result};
 
 /// The file with the way from an enlarged index to its model.
@@ -69,7 +69,7 @@ fn read(store: &Path, file: &str) -> Option<String> {
         return None;
     }
     let mut text = String::new();
-    File::open(path).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;
+    open(&path).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;
     Some(text)
         .filter(|way| !way.is_empty() && !way.contains(char::is_control) && Path::new(way).is_relative())
 }

@@ -9,7 +9,7 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use super::mapped::{self, Temporary, folder_of, write_file};
+use super::mapped::{self, MappedFile, Temporary, folder_of, open, write_file};
 use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
@@ -227,7 +227,7 @@ fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
         return Err(taken(path, "exists and is no file").hint("choose another name for the result"));
     }
     let length = fs::metadata(path).map_err(failed)?.len();
-    let file = BufReader::with_capacity(BUFFER_BYTES, File::open(path).map_err(failed)?);
+    let file = BufReader::with_capacity(BUFFER_BYTES, open(path).map_err(failed)?);
     let mut output = Output { to: To::Compare(file) };
     let written = write(&mut output);
     let different =
@@ -244,7 +244,7 @@ fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
 /// Compares a file that was made with the one that is there.
 fn compare_files(made: &Path, path: &Path) -> Result<()> {
     let failed = |error| Error::io("read", path, error);
-    let mut made = BufReader::with_capacity(BUFFER_BYTES, File::open(made).map_err(failed)?);
+    let mut made = BufReader::with_capacity(BUFFER_BYTES, open(made).map_err(failed)?);
     compare(path, |output| io::copy(&mut made, output).map(|_| ()).map_err(failed))
 }
 
@@ -263,10 +263,12 @@ impl Folder {
         if !self.compared {
             return write_file(&path, bytes);
         }
-        match fs::read(&path) {
-            Ok(found) if found == bytes => Ok(()),
+        match MappedFile::open(&path) {
+            Ok(found) if found.as_ref() == bytes => Ok(()),
             Ok(_) => Err(different_folder(&self.root)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(different_folder(&self.root)),
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
+                Err(different_folder(&self.root))
+            }
             Err(error) => Err(Error::io("read", &path, error)),
         }
     }
@@ -276,11 +278,15 @@ impl Folder {
         let names = self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         for name in names.iter() {
             let (ours, theirs) = (self.root.join(name), folder.join(name));
-            let made = fs::read(&ours).map_err(|error| Error::io("read", &ours, error))?;
-            match fs::read(&theirs) {
-                Ok(found) if found == made => {}
+            let made = MappedFile::open(&ours).map_err(|error| Error::io("read", &ours, error))?;
+            match MappedFile::open(&theirs) {
+                Ok(found) if found.as_ref() == made.as_ref() => {}
                 Ok(_) => return Ok(false),
-                Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) =>
+                {
+                    return Ok(false);
+                }
                 Err(error) => return Err(Error::io("read", &theirs, error)),
             }
         }

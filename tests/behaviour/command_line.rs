@@ -394,6 +394,8 @@ fn what_a_model_lacks_is_told_with_the_command_that_makes_it() {
     let other = folder.path().join("other.zarr");
     let told = fail(&mut image(&["--values", "measured", "--measurement", other.to_str().unwrap()]), 66);
     assert!(!told.contains("name the measurement with"), "{told}");
+    // Where it lay is not known any more.
+    std::fs::remove_file(model.join("measurement-path")).unwrap();
     let told = fail(&mut image(&["--values", "measured"]), 66);
     assert!(told.contains("name the measurement with --measurement"), "{told}");
 }

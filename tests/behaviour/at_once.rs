@@ -25,26 +25,29 @@ fn made(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     files
 }
 
+/// The arguments that make a variant of an output.
+type Arguments = fn(usize) -> Vec<String>;
+
 /// Outputs and the arguments that make them; `variant` 0 and 1 make different ones.
-fn outputs() -> Vec<(&'static str, fn(usize) -> Vec<String>)> {
-    fn words(text: String) -> Vec<String> {
+fn outputs() -> Vec<(&'static str, Arguments)> {
+    fn words(text: &str) -> Vec<String> {
         text.split(' ').map(str::to_owned).collect()
     }
     fn measurement() -> String {
         fixture().measurement().display().to_string()
     }
-    let mut list: Vec<(&'static str, fn(usize) -> Vec<String>)> = vec![
-        ("s.zip", |variant| words(format!("sample OUT --size 16x16 --views 2 --lights 3 --seed {variant}"))),
-        ("e.zip", |variant| words(format!("export {} OUT --quality {}", measurement(), 90 + variant))),
-        ("e.btf", |variant| words(format!("export {} OUT --rank {}", measurement(), 1 + variant))),
-        ("e", |variant| words(format!("export {} OUT --to {}", measurement(), ["png", "exr"][variant]))),
-        ("i.png", |variant| words(format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
-        ("i.exr", |variant| words(format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
+    let mut list: Vec<(&'static str, Arguments)> = vec![
+        ("s.zip", |variant| words(&format!("sample OUT --size 16x16 --views 2 --lights 3 --seed {variant}"))),
+        ("e.zip", |variant| words(&format!("export {} OUT --quality {}", measurement(), 90 + variant))),
+        ("e.btf", |variant| words(&format!("export {} OUT --rank {}", measurement(), 1 + variant))),
+        ("e", |variant| words(&format!("export {} OUT --to {}", measurement(), ["png", "exr"][variant]))),
+        ("i.png", |variant| words(&format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
+        ("i.exr", |variant| words(&format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
     ];
     if cfg!(feature = "hdf5") {
-        list.push(("e.h5", |_| words(format!("export {} OUT", measurement()))));
+        list.push(("e.h5", |_| words(&format!("export {} OUT", measurement()))));
     }
-    list.push(("e.npy", |_| words(format!("export {} OUT", measurement()))));
+    list.push(("e.npy", |_| words(&format!("export {} OUT", measurement()))));
     list
 }
 
@@ -60,7 +63,7 @@ fn command(arguments: &[String], output: &Path) -> Command {
 }
 
 /// What each variant makes alone.
-fn alone(name: &str, arguments: fn(usize) -> Vec<String>, variant: usize) -> BTreeMap<PathBuf, Vec<u8>> {
+fn alone(name: &str, arguments: Arguments, variant: usize) -> BTreeMap<PathBuf, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     succeed(&mut command(&arguments(variant), &folder.path().join(name)));
     made(folder.path())

@@ -147,7 +147,7 @@ fn names_that_are_no_text_are_used_as_they_are() {
         std::fs::copy(fixture().archive(), at(name)).unwrap();
     }
     succeed(btf().arg("import").args([at(b"a\xff.zip"), at(b"a\xfe.zip")]).arg("--into").arg(at(b"out\xfd")));
-    let [first, second] = [&b"out\xfd/a\xff.zarr"[..], b"out\xfd/a\xfe.zarr"].map(|name| at(name));
+    let [first, second] = [&b"out\xfd/a\xff.zarr"[..], b"out\xfd/a\xfe.zarr"].map(&at);
     assert!(first.is_dir() && second.is_dir());
     // Two that become one are still refused.
     std::fs::create_dir(at(b"other")).unwrap();

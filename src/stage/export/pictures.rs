@@ -87,8 +87,7 @@ fn display_codes(images: &Samples, description: &Description, beyond: &Beyond) -
     let channels = description.n_channels();
     let kept = if channels == 1 { 1 } else { 3 };
     let pixels = (0..images.len()).step_by(channels);
-    let values: Vec<f64> =
-        pixels.flat_map(|at| decoder.rgb(images, at).into_iter().take(kept).map(f64::from)).collect();
+    let values: Vec<f64> = pixels.flat_map(|at| decoder.rgb(images, at).into_iter().take(kept)).collect();
     beyond.count_not_finite(loss::not_finite(images));
     beyond.count(values.iter().copied());
     Ok(values.into_iter().map(srgb_encode_u8).collect())

@@ -61,6 +61,8 @@ mod picture_formats;
 mod pictures;
 #[path = "behaviour/places.rs"]
 mod places;
+#[path = "behaviour/readme.rs"]
+mod readme;
 #[path = "behaviour/real_data.rs"]
 mod real_data;
 #[path = "behaviour/recipes.rs"]

@@ -86,6 +86,7 @@ impl Error {
         let reading = matches!(action, "read" | "list" | "open");
         let kind = match source.kind() {
             ErrorKind::NotFound if reading => Kind::Missing,
+            _ if reading && is_loop(&source) => Kind::Missing,
             _ => Kind::Io,
         };
         Self {
@@ -130,6 +131,12 @@ impl Error {
         self
     }
 
+    /// Whether the operating system denied it, as by [`is_denied`].
+    pub(crate) fn is_denied(&self) -> bool {
+        let source = self.source.as_deref().and_then(|source| source.downcast_ref::<std::io::Error>());
+        source.is_some_and(is_denied)
+    }
+
     /// Whose fault it is.
     pub fn kind(&self) -> Kind {
         self.kind
@@ -167,6 +174,18 @@ impl From<btfkit_formats::Error> for Error {
         }
         .caused_by(error)
     }
+}
+
+/// Whether the operating system lets nobody, or not this user, do it: a file system that is read-only, or no permission.
+pub(crate) fn is_denied(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied)
+}
+
+/// Whether links lead back to themselves.
+pub(crate) fn is_loop(error: &std::io::Error) -> bool {
+    /// `ELOOP`, which has no stable name in the standard library.
+    const LOOP: i32 = if cfg!(target_os = "linux") { 40 } else { 62 };
+    error.raw_os_error() == Some(LOOP)
 }
 
 /// What to do about what the operating system refused.

@@ -24,6 +24,7 @@ pub mod kernel;
 pub mod lattice;
 pub mod likeness;
 pub mod mrf;
+pub mod names;
 pub mod picture;
 pub mod random;
 pub mod run;

@@ -3,6 +3,8 @@
 
 #[path = "behaviour/archives.rs"]
 mod archives;
+#[path = "behaviour/at_once.rs"]
+mod at_once;
 #[path = "behaviour/bad_input.rs"]
 mod bad_input;
 #[path = "behaviour/baselines.rs"]
@@ -44,6 +46,8 @@ mod interruption;
 mod judging;
 #[path = "behaviour/lattices.rs"]
 mod lattices;
+#[path = "behaviour/losses.rs"]
+mod losses;
 #[path = "behaviour/many.rs"]
 mod many;
 #[path = "behaviour/odd_archives.rs"]
@@ -57,6 +61,8 @@ mod paper_bytes;
 mod picture_formats;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
+#[path = "behaviour/places.rs"]
+mod places;
 #[path = "behaviour/readme.rs"]
 mod readme;
 #[path = "behaviour/real_data.rs"]

@@ -6,6 +6,7 @@ use btfkit::run::Context;
 use btfkit::stage::cluster::curve;
 use btfkit::texel::cluster::centre::CentreRule;
 use btfkit::texel::cluster::lloyd::Limits;
+use btfkit::words::counted;
 use clap::Args;
 
 use super::table::{row, table};
@@ -78,6 +79,10 @@ fn tell_curve(curve: &curve::Curve, tell: Tell) {
     }
     tell.text(&table(&rows));
     if curve.sample_texels < curve.tile_texels {
-        tell.line(format!("of a sample of {} of {} texels", curve.sample_texels, curve.tile_texels));
+        tell.line(format!(
+            "of a sample of {} of {}",
+            curve.sample_texels,
+            counted(curve.tile_texels, "texel")
+        ));
     }
 }

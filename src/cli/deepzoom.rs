@@ -92,6 +92,7 @@ impl Deepzoom {
             report.tiles_found
         ));
         tell.line(format!("{}: a viewer of it", output.with_extension("html").display()));
+        tell.notes(&report.notes);
         Ok(())
     }
 }

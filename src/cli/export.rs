@@ -79,9 +79,7 @@ impl Export {
         };
         let report = export::run(&measurement, &options, context)?;
         tell.line(format!("{}: {}{}", self.output.display(), bytes_text(report.bytes), found(report.made)));
-        for warning in &report.warnings {
-            tell.line(format!("note: {warning}"));
-        }
+        tell.notes(&report.warnings);
         Ok(())
     }
 }

@@ -3,11 +3,12 @@ use std::path::{Path, PathBuf};
 use btfkit::error::Result;
 use btfkit::mrf;
 use btfkit::mrf::marginals::Matching;
+use btfkit::names::with_ending;
 use btfkit::run::Context;
 use btfkit::stage::fit::statistics::{COMPONENTS, Figures};
 use btfkit::stage::fit::{self, sheet};
 use btfkit::store::field::FieldReport;
-use btfkit::store::output::write_new;
+use btfkit::store::output::{prepare_bytes, publish_all};
 use clap::{Args, ValueEnum};
 
 use super::Tell;
@@ -93,11 +94,12 @@ impl Fit {
         let Some(name) = &self.report else { return Ok(()) };
         let comparison = fit::compare(&self.model, context)?;
         let text = figures_text(&comparison.figures());
-        let file = |ending: &str| PathBuf::from(format!("{}.{ending}", name.display()));
-        write_new(&file("txt"), context.existing, format!("{text}\n").as_bytes())?;
+        let file = |ending: &str| name.with_file_name(with_ending(name, &[], ending));
         let title = self.model.file_name().unwrap_or_default().to_string_lossy().into_owned();
         tell.text(&text);
-        sheet::draw(&comparison, &title).write(&file("png"), context.existing)?;
+        let text = prepare_bytes(&file(".txt"), context.existing, format!("{text}\n").as_bytes())?;
+        let sheet = sheet::draw(&comparison, &title).prepare(&file(".png"), context.existing)?;
+        publish_all([text, sheet])?;
         Ok(())
     }
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use btfkit::error::{Error, Result};
 use btfkit::store::mapped::write_file;
 use btfkit::words::counted;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Command, CommandFactory};
 use clap_complete::Shell;
 use clap_mangen::Man;
@@ -42,6 +43,31 @@ pub(super) fn command() -> Command {
         format!("{{about-with-newline}}\n{{usage-heading}} {{usage}}\n{groups}\n{{options}}{{after-help}}"),
     )
 }
+
+/// A refusal of the command line, in words that help where those of the parser do not.
+pub(super) fn explained(mut error: clap::Error) -> clap::Error {
+    // What would pass a stray negative number on as a name of a file is no way to give one.
+    let is_number =
+        |value: &ContextValue| matches!(value, ContextValue::String(text) if text.parse::<f64>().is_ok());
+    if error.kind() == ErrorKind::UnknownArgument && error.get(ContextKind::InvalidArg).is_some_and(is_number)
+    {
+        let tip = "a number stands behind the option that it is for, such as --window -500,12345,512,512; with a file of \
+                   that name, write ./ before it";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+        return error;
+    }
+    let told = error.render().to_string();
+    match told.contains(NO_NUMBER) {
+        true => clap::Error::raw(
+            error.kind(),
+            told.trim_start_matches("error: ").replace(NO_NUMBER, "expected a whole number, 0 or more"),
+        ),
+        false => error,
+    }
+}
+
+/// What the standard library says of what is no whole number.
+const NO_NUMBER: &str = "invalid digit found in string";
 
 /// The commands by groups, a line or more each.
 fn groups(command: &Command) -> String {

@@ -73,8 +73,9 @@ impl Image {
             BitsName::Sixteen => Bits::Sixteen,
         };
         let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(Some(bits), self.quality)?;
-        let (size, made) = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
-        tell.line(format!("{}: {size}{}", self.out.display(), found(made)));
+        let report = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
+        tell.line(format!("{}: {}{}", self.out.display(), report.size, found(report.made)));
+        tell.notes(&report.notes);
         Ok(())
     }
 }

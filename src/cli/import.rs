@@ -6,6 +6,7 @@ use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
 use btfkit::store::codec::Chain;
 use btfkit::store::measurement::Description;
+use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
 use clap::Args;
 
@@ -73,6 +74,7 @@ impl Import {
         if let Some(absent) =
             self.paths.iter().find(|path| !(path.exists() || self.into.is_none() && is_store(path)))
         {
+            expect_readable(absent)?;
             let error = Error::missing(format!("{}: no such archive", absent.display()));
             return Err(
                 if self.into.is_none() && self.paths.len() > 1 && Some(absent) == self.paths.last() {
@@ -142,6 +144,7 @@ impl Import {
         context.progress.begin("import", total, Counted::Items("images"));
         let overall = Overall { bar: context.progress };
         let inner = Context::new(&overall, context.stop, context.threads, context.memory_bytes)?
+            .with_memory(context.memory())
             .with_existing(context.existing);
         let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
         each(jobs, name, false, context, tell, |job| {

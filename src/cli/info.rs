@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
+use btfkit::names::ends_with;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
 use btfkit::stage::verify::is_pyramid;
@@ -93,7 +94,9 @@ impl Info {
     fn look(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Told> {
         let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
         let is_zarr = ["zarr.json"].iter().chain(&VERSION_2).any(|name| first.join(name).exists());
-        if is_zarr || is_pyramid(first) {
+        // A store that has lost its metadata is no archive.
+        let is_named_so = ends_with(first, ".zarr");
+        if is_zarr || is_named_so || is_pyramid(first) {
             return about::store(first).map(Told::Store);
         }
         let source = self.source.open(paths)?;

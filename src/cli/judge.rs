@@ -6,7 +6,7 @@ use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
-use btfkit::store::output::write_new;
+use btfkit::store::output::{prepare_bytes, publish_all};
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
@@ -66,14 +66,16 @@ impl Judge {
             context,
         )?;
         tell.text(&told(&report));
+        let mut files = Vec::new();
         if let Some(path) = &self.json {
             let text =
                 serde_json::to_string_pretty(&report).map_err(|error| Error::internal(error.to_string()))?;
-            write_new(path, context.existing, text.as_bytes())?;
+            files.push(prepare_bytes(path, context.existing, text.as_bytes())?);
         }
         if let Some(path) = &self.sheet {
-            sheet.write(path, context.existing)?;
+            files.push(sheet.prepare(path, context.existing)?);
         }
+        publish_all(files)?;
         Ok(())
     }
 }

@@ -36,7 +36,7 @@ use std::time::Duration;
 
 use btfkit::error::{Error, Kind, Result};
 use btfkit::run::Context;
-use btfkit::run::budget::{address_space_left, cannot_start};
+use btfkit::run::budget::{Allowance, cannot_start, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::store::output::{Existing, Made};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
@@ -134,8 +134,9 @@ enum Command {
 
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
-    let matches = help::command().get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let matches = help::command().try_get_matches();
+    let cli = matches.and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = cli.unwrap_or_else(|error| help::explained(error).exit());
     let threads = cli.common.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,
@@ -145,13 +146,7 @@ pub(crate) fn run() -> ExitCode {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
-    // A failed allocation ends in an abort; what is left lies in temporary files and is swept. With an exit code of ours
-    // schedulers need not take it for a bug that leaves a core.
-    let _ = signal_hook::flag::register_conditional_shutdown(
-        signal_hook::consts::SIGABRT,
-        1,
-        Arc::new(AtomicBool::new(true)),
-    );
+    explain_aborts(cli.common.progress == ProgressStyle::Json);
     // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
@@ -162,17 +157,24 @@ pub(crate) fn run() -> ExitCode {
     };
     let tell =
         Tell { quiet: cli.common.quiet, found: false, json: cli.common.progress == ProgressStyle::Json };
-    let memory = cli.common.memory.min(address_space_left().unwrap_or(u64::MAX));
+    let memory = Allowance::new(cli.common.memory);
+    if memory.by_system {
+        spare_address_space();
+    }
     // zarrs decodes chunks on the global pool.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     let result = pool
         .map_err(|error| cannot_start(threads, &error))
-        .and_then(|()| Context::new(progress.as_ref(), &stop, threads, memory))
+        .and_then(|()| Context::new(progress.as_ref(), &stop, threads, memory.bytes))
         .map(|context| {
+            let context = context.with_memory(memory);
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
-        .inspect(|context| obey_while_computing(&stop, context.computing()))
-        .and_then(|context| cli.command.run(&context, tell));
+        .inspect(|context| obey_while_computing(&stop, context.computing(), tell))
+        .and_then(|context| {
+            context.require("the program itself", 0)?;
+            cli.command.run(&context, tell)
+        });
     progress.end();
     let result = result.and_then(|ended| match UNTOLD.get() {
         Some(error) => {
@@ -190,11 +192,29 @@ pub(crate) fn run() -> ExitCode {
     }
 }
 
+/// A failed allocation ends in an abort; what is left lies in temporary files and is swept. With an exit code of ours
+/// schedulers need not take it for a bug that leaves a core.
+#[allow(unsafe_code)]
+fn explain_aborts(json: bool) {
+    const TOLD: &str = "btf: ended early, most likely since the system gives no more memory\n  \
+        raise its limit (ulimit -v, or that of the container), or choose fewer --threads or a smaller --memory\n";
+    const TOLD_JSON: &str = "{\"event\":\"error\",\"exit_code\":1,\"message\":\"ended early, most likely since the \
+        system gives no more memory\",\"advice\":\"raise its limit (ulimit -v, or that of the container), or choose \
+        fewer --threads or a smaller --memory\"}\n";
+    let told = if json { TOLD_JSON } else { TOLD };
+    let explain = move || {
+        let _ = std::io::stderr().write_all(told.as_bytes());
+        signal_hook::low_level::exit(1);
+    };
+    // SAFETY: standard error has no buffer, so that nothing is allocated; whoever else holds it goes on and releases it.
+    let _ = unsafe { signal_hook::low_level::register(signal_hook::consts::SIGABRT, explain) };
+}
+
 /// Time between two looks at whether a stop was asked for.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Ends the program at the first signal while it computes what cannot look for one: there is nothing to lose but time.
-fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>) {
+fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell: Tell) {
     let stop = Arc::clone(stop);
     // Without a thread for it the second signal ends the program.
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
@@ -202,8 +222,7 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>) {
             std::thread::sleep(LOOK);
             if stop.load(Ordering::SeqCst) && computing.load(Ordering::SeqCst) {
                 let error = Error::stopped();
-                let _ =
-                    writeln!(std::io::stderr(), "btf: {error}\n  {}", error.guidance().unwrap_or_default());
+                tell.failure(None, &error);
                 std::process::exit(i32::from(exit_code(error.kind())));
             }
         }
@@ -279,6 +298,11 @@ impl Tell {
     /// One line. Whatever it names cannot end it, or change what the terminal shows.
     fn line(self, text: impl std::fmt::Display) {
         self.print(&escaped(&text.to_string()));
+    }
+
+    /// What a user should know of a result, a line each.
+    fn notes(self, notes: &[String]) {
+        notes.iter().for_each(|note| self.line(format!("note: {note}")));
     }
 
     /// Lines, of a table say, whose cells are escaped already.

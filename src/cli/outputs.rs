@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
+use btfkit::names::{ends_with, with_ending};
 use btfkit::store::Store;
 
 /// An input and the output to make of it.
@@ -43,16 +44,14 @@ impl Naming<'_> {
     }
 
     fn is_input(&self, name: &Path) -> bool {
-        let by_ending = self.ending.is_some_and(|ending| file_name(name).ends_with(ending));
+        let by_ending = self.ending.is_some_and(|ending| ends_with(name, ending));
         by_ending || Store::at(name).expect_one_of(&[self.reads]).is_ok()
     }
 
     /// The output of an input: beside it, or in a folder.
     fn output(&self, input: &Path, into: Option<&Path>) -> PathBuf {
-        let name = file_name(input);
-        let stem =
-            [self.ending, Some(".zarr")].into_iter().flatten().find_map(|ending| name.strip_suffix(ending));
-        let name = format!("{}{}", stem.unwrap_or(&name), self.becomes);
+        let endings: Vec<&str> = self.ending.into_iter().chain([".zarr"]).collect();
+        let name = with_ending(input, &endings, self.becomes);
         match into {
             Some(folder) => folder.join(name),
             // A trailing slash would make the input its own folder.
@@ -66,8 +65,4 @@ pub(super) fn wanted_twice<'a>(outputs: impl Iterator<Item = &'a Path>) -> Optio
     let mut outputs: Vec<&Path> = outputs.collect();
     outputs.sort();
     outputs.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0])
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

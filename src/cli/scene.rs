@@ -26,7 +26,8 @@ pub(super) struct SceneArgs {
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
     #[arg(long, value_enum, default_value = "model")]
     values: ValuesName,
-    /// The measurement, for --values measured [default: beside the model, without .model in its name]
+    /// The measurement, for --values measured [default: where it lay when the model was made; beside the
+    /// model or in the current folder, without .model in its name]
     #[arg(long)]
     measurement: Option<PathBuf>,
     /// The model of an enlarged index [default: beside it, under the name it had]

@@ -6,6 +6,7 @@ use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
 use btfkit::archive::{self, Source};
 use btfkit::color::Transfer;
 use btfkit::error::Result;
+use btfkit::store::recognise::expect_readable;
 use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;
 use clap::{Args, ValueEnum};
@@ -118,6 +119,7 @@ impl SourceArgs {
 
     /// Opens the archive at one path, or in pieces at several.
     pub(super) fn open(&self, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+        paths.iter().try_for_each(|path| expect_readable(path))?;
         archive::open(paths, &self.options())
     }
 }

@@ -265,7 +265,7 @@ fn embed(
 ) -> Result<Vec<Embedded>> {
     let shots: Vec<_> = sections.iter().flat_map(Section::shots).collect();
     context.progress.begin("pictures", shots.len() as u64, Counted::Items("pictures"));
-    let in_flight = units::in_flight(context, PICTURE_BYTES);
+    let in_flight = units::in_flight(context, "a picture", PICTURE_BYTES)?;
     let embedded = units::for_each(context, &shots, in_flight, |shot| {
         let path = folder.join(&shot.file).with_extension("png");
         let embedded = write_and_embed(&workshop.picture(shot.subject, context)?, &path)?;

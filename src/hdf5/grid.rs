@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 use std::collections::HashMap;
 
+use crate::words::counted;
 use btfkit_formats::{Direction, Limits};
 
 /// Directions whose x and y differ by no more than this are one.
@@ -36,10 +37,11 @@ impl Grid {
         let (missing, repeated) = (pairs - image_of.len(), count - image_of.len());
         if missing + repeated > 0 {
             return Err(format!(
-                "got {count} images of {} views and {} lights: of {pairs} pairs {missing} are missing, and \
-                 {repeated} images repeat a pair; expected one image of every pair",
-                views.len(),
-                lights.len()
+                "got {} of {} and {}: of {pairs} pairs {missing} are missing, and {repeated} images repeat a pair; \
+                 expected one image of every pair",
+                counted(count, "image"),
+                counted(views.len(), "view"),
+                counted(lights.len(), "light")
             ));
         }
         let every = (0..views.len()).flat_map(|view| (0..lights.len()).map(move |light| (view, light)));

@@ -1,7 +1,6 @@
 //! Writes a measurement as one HDF5 file, view by view.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::{Contents, Direction, SampleType, Samples, f16};
@@ -12,7 +11,7 @@ use serde_json::{Map, Value};
 use super::attribute;
 use super::measurement::{DIRECTIONS, FORMAT, LUMINANCE, RADIOMETRY, REFLECTANCE, TOLD, TRANSFER};
 use crate::error::{Error, Kind, Result};
-use crate::store::mapped::{self, Temporary};
+use crate::store::mapped::Temporary;
 use crate::store::measurement::KIND;
 use crate::store::output::{self, Existing, Made};
 
@@ -22,12 +21,15 @@ const CHUNK_SIDE: usize = 16;
 /// Level of deflate: the fastest, as for the store.
 const DEFLATE_LEVEL: u8 = 1;
 
+/// The file within its temporary folder.
+const FILE: &str = "file.h5";
+
 /// An HDF5 file that is being written. It appears under its name with [`Writer::finish`], whole; dropped before, it leaves
 /// nothing.
 pub struct Writer {
     path: PathBuf,
     existing: Existing,
-    temporary: PathBuf,
+    temporary: Temporary,
     file: Option<File>,
     /// [view, y, x, light, channel].
     shape: [usize; 5],
@@ -58,20 +60,17 @@ impl Writer {
                 path.display()
             )));
         }
-        // The C library holds a lock of the same kind on the file that it writes.
+        // In a folder that is locked, since the C library locks files itself and releases them when it closes them.
         Temporary::sweep_beside(path);
-        let temporary = mapped::temporary_name(path);
+        let temporary = Temporary::folder(path).map_err(|error| Error::io("write", path, error))?;
         // The newer layout of metadata has checksums throughout; the older one has none, and the C library believes it.
         // Without times the same measurement gives the same bytes.
         let builder = File::with_options()
             .with_fapl(|access| access.libver_v110())
             .with_fcpl(|create| create.obj_track_times(false))
             .clone();
-        let file = builder.create_excl(&temporary).map_err(|error| {
-            // It may have got as far as the file.
-            let _ = fs::remove_file(&temporary);
-            cannot_write(path, &error)
-        })?;
+        let file =
+            builder.create_excl(temporary.path().join(FILE)).map_err(|error| cannot_write(path, &error))?;
         let mut writer = Self {
             path: path.to_owned(),
             existing: Existing::Keep,
@@ -217,15 +216,14 @@ impl Writer {
         if let Some(file) = self.file.take() {
             file.flush().and_then(|()| file.close()).map_err(|error| cannot_write(&self.path, &error))?;
         }
-        output::settle(&self.temporary, &self.path, self.existing)
+        output::settle(&self.temporary.path().join(FILE), &self.path, self.existing)
     }
 }
 
 impl Drop for Writer {
     fn drop(&mut self) {
+        // Closed before the temporary folder is removed.
         (self.reflectance, self.luminance, self.file) = (None, None, None);
-        // Gone already where it was given its name.
-        let _ = fs::remove_file(&self.temporary);
     }
 }
 

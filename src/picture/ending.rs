@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::run::budget::Allowance;
 use crate::shape::Size;
 
 /// Formats of pictures, by the endings of their names.
@@ -196,20 +197,17 @@ impl Encoding {
     ///
     /// # Errors
     /// [`crate::Kind::Usage`] with what it needs.
-    pub fn check_memory(self, size: Size, least: u64, allowed: u64) -> Result<()> {
+    pub fn check_memory(self, size: Size, least: u64, allowed: Allowance) -> Result<()> {
         let needed = self.memory_bytes(size).saturating_add(least);
-        if self.ending.streams() || needed <= allowed {
+        if self.ending.streams() {
             return Ok(());
         }
-        Err(Error::usage(format!(
-            "a {} of {size} is put together in memory and takes {} MiB, {} MiB are allowed",
-            self.ending.name(),
-            needed.div_ceil(1 << 20),
-            allowed >> 20
-        ))
-        .hint(
-            "write .png or .exr, which take any size, show a part with --window, or allow a larger --memory",
-        ))
+        let what = format!("a {} of {size}, which is put together in memory,", self.ending.name());
+        allowed.require(
+            &what,
+            needed,
+            "write .png or .exr, which take any size, or show a part with --window",
+        )
     }
 }
 

@@ -14,7 +14,7 @@ pub use ending::{Bits, Encoding, Ending};
 use crate::color::{srgb_encode, srgb_encode_all};
 use crate::error::Result;
 use crate::shape::{Size, Window};
-use crate::store::output::{Existing, Made};
+use crate::store::output::{Existing, Made, Ready};
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,9 +157,17 @@ impl Picture {
     /// An ending that is not known, a size that the format does not take, those of writing, and
     /// [`crate::Kind::Recipe`] where another file is.
     pub fn write(&self, path: &Path, existing: Existing) -> Result<Made> {
+        self.prepare(path, existing)?.publish()
+    }
+
+    /// As [`Self::write`], without its name yet.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn prepare(&self, path: &Path, existing: Existing) -> Result<Ready> {
         let encoding = Encoding::of(path, &Ending::ALL)?;
         let mut rows = self.pixels.chunks_exact(self.size.width);
-        stream::write(path, encoding, self.size, self.meaning, existing, |row| {
+        stream::prepare(path, encoding, self.size, self.meaning, existing, |row| {
             rows.next().into_iter().for_each(|pixels| row.copy_from_slice(pixels));
             Ok(())
         })

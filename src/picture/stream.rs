@@ -12,7 +12,7 @@ use exr::meta::header::Header;
 use crate::error::{Error, Result};
 use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
 use crate::shape::Size;
-use crate::store::output::{Existing, Made, write_whole, write_whole_seeking};
+use crate::store::output::{self, Existing, Made, Ready, prepare_seeking};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
@@ -31,11 +31,26 @@ pub fn write(
     existing: Existing,
     row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
 ) -> Result<Made> {
+    prepare(path, encoding, size, meaning, existing, row)?.publish()
+}
+
+/// As [`write`], without its name yet.
+///
+/// # Errors
+/// As [`write`].
+pub fn prepare(
+    path: &Path,
+    encoding: Encoding,
+    size: Size,
+    meaning: Meaning,
+    existing: Existing,
+    row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
+) -> Result<Ready> {
     encoding.check_size(size)?;
     if encoding.ending == Ending::Exr {
-        return write_whole_seeking(path, existing, |output| exr(output, size, row));
+        return prepare_seeking(path, existing, |output| exr(output, size, row));
     }
-    write_whole(path, existing, |output| match encoding.ending {
+    output::prepare(path, existing, |output| match encoding.ending {
         Ending::Png => png(output, encoding.bits, size, meaning, row),
         Ending::Exr => exr(output, size, row),
         Ending::Jpeg | Ending::WebP | Ending::Tiff => encoded::write(output, encoding, size, meaning, row),

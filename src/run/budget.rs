@@ -1,26 +1,62 @@
 //! What `--memory` allows: the program's own share, what a stage needs at least, and what the system leaves.
 
 use crate::error::{Error, Kind, Result};
+use crate::words::counted;
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
 pub const OWN_BYTES: u64 = 12 << 20;
 
-/// Checks what cannot be done without against what is allowed.
-///
-/// # Errors
-/// [`crate::Kind::Usage`], with what it needs.
-pub fn require(what: &str, needed: u64, allowed: u64) -> Result<()> {
-    if needed <= allowed {
-        return Ok(());
+/// Memory that the work may use, and who says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Allowance {
+    /// Bytes.
+    pub bytes: u64,
+    /// Whether the system leaves no more (`ulimit -v`), whatever `--memory` says.
+    pub by_system: bool,
+}
+
+impl Allowance {
+    /// What `--memory` allows and the system leaves.
+    pub fn new(option_bytes: u64) -> Self {
+        match address_space_left() {
+            Some(left) if left < option_bytes => Self { bytes: left, by_system: true },
+            _ => Self { bytes: option_bytes, by_system: false },
+        }
     }
-    let mib = needed.div_ceil(1 << 20);
-    Err(Error::usage(format!("{what} takes {mib} MiB of memory, {} MiB are allowed", allowed >> 20))
-        .hint(format!("--memory {mib}MiB, or more, allows it")))
+
+    /// Checks what cannot be done without against what is allowed. `otherwise` is what else helps, if anything does.
+    ///
+    /// # Errors
+    /// With what it needs and what to do: [`Kind::Usage`], or [`Kind::Internal`] where the system leaves no more.
+    pub fn require(self, what: &str, needed: u64, otherwise: &str) -> Result<()> {
+        if needed <= self.bytes {
+            return Ok(());
+        }
+        let mib = needed.div_ceil(1 << 20);
+        let found = format!("{what} takes {mib} MiB of memory, {} allowed", amount(self.bytes));
+        let or = if otherwise.is_empty() { String::new() } else { format!("; or {otherwise}") };
+        Err(if self.by_system {
+            Error::new(Kind::Internal, format!("{found} by the limit of the address space"))
+                .hint(format!("raise that limit (ulimit -v){or}"))
+        } else {
+            Error::usage(found).hint(format!("--memory {mib}MiB, or more, allows it{or}"))
+        })
+    }
+}
+
+/// `64 MiB are`, in whole units, rounded down.
+fn amount(bytes: u64) -> String {
+    let (number, unit) = match bytes {
+        0..1024 => return format!("{} {}", counted(bytes, "byte"), if bytes == 1 { "is" } else { "are" }),
+        1024..0x10_0000 => (bytes >> 10, "KiB"),
+        _ => (bytes >> 20, "MiB"),
+    };
+    format!("{number} {unit} {}", if number == 1 { "is" } else { "are" })
 }
 
 /// The error of threads that the system does not start.
 pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
-    Error::new(Kind::Io, format!("cannot start {threads} threads: {error}"))
+    Error::new(Kind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
         .hint("choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)")
 }
 
@@ -31,6 +67,21 @@ pub fn address_space_left() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let used = std::fs::read_to_string("/proc/self/statm").ok()?;
     space_left(&limits, &used)
+}
+
+/// Lets all threads allocate from one arena: each of its own reserves 64 MiB of address space, so that with `ulimit -v`
+/// little remains to be used. To be called before threads are started.
+#[allow(unsafe_code)]
+pub fn spare_address_space() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        const M_ARENA_MAX: i32 = -8;
+        unsafe extern "C" {
+            safe fn mallopt(parameter: i32, value: i32) -> i32;
+        }
+        // Refused, it changes nothing.
+        let _ = mallopt(M_ARENA_MAX, 1);
+    }
 }
 
 fn space_left(limits: &str, used: &str) -> Option<u64> {
@@ -57,9 +108,20 @@ mod tests {
 
     #[test]
     fn what_is_needed_is_said() {
-        let error = require("a tile", 70 << 20, 64 << 20).unwrap_err();
-        assert_eq!(error.to_string(), "a tile takes 70 MiB of memory, 64 MiB are allowed");
-        assert!(error.guidance().unwrap().contains("--memory 70MiB"));
-        assert!(require("a tile", 64 << 20, 64 << 20).is_ok());
+        let by =
+            |bytes, by_system| Allowance { bytes, by_system }.require("a tile", 70 << 20, "make it smaller");
+        let told = |bytes| by(bytes, false).unwrap_err().to_string();
+        assert_eq!(told(64 << 20), "a tile takes 70 MiB of memory, 64 MiB are allowed");
+        assert_eq!(told(1 << 20), "a tile takes 70 MiB of memory, 1 MiB is allowed");
+        assert_eq!(told(2500), "a tile takes 70 MiB of memory, 2 KiB are allowed");
+        assert_eq!(told(1), "a tile takes 70 MiB of memory, 1 byte is allowed");
+        assert_eq!(told(0), "a tile takes 70 MiB of memory, 0 bytes are allowed");
+        let hint = by(1, false).unwrap_err().guidance().unwrap().to_owned();
+        assert_eq!(hint, "--memory 70MiB, or more, allows it; or make it smaller");
+        let error = by(64 << 20, true).unwrap_err();
+        assert_eq!(error.kind(), Kind::Internal);
+        let hint = error.guidance().unwrap();
+        assert!(hint.contains("ulimit -v") && !hint.contains("--memory"), "{hint}");
+        assert!(by(70 << 20, false).is_ok());
     }
 }

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
+use crate::run::budget::Allowance;
 use crate::store::output::Existing;
 use progress::Progress;
 
@@ -26,6 +27,7 @@ pub struct Context<'a> {
     pub memory_bytes: u64,
     /// What to do about what lies where a result is to be.
     pub existing: Existing,
+    memory_by_system: bool,
     computing: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
@@ -49,6 +51,7 @@ impl<'a> Context<'a> {
             threads,
             memory_bytes,
             existing: Existing::Keep,
+            memory_by_system: false,
             computing: Arc::default(),
             pool,
         })
@@ -60,6 +63,17 @@ impl<'a> Context<'a> {
         Self { existing, ..self }
     }
 
+    /// The same with this memory.
+    #[must_use]
+    pub fn with_memory(self, memory: Allowance) -> Self {
+        Self { memory_bytes: memory.bytes, memory_by_system: memory.by_system, ..self }
+    }
+
+    /// Memory that the work may use, the program's own included, and who says so.
+    pub fn memory(&self) -> Allowance {
+        Allowance { bytes: self.memory_bytes, by_system: self.memory_by_system }
+    }
+
     /// An error of kind `Stopped` once a stop has been asked for.
     pub fn check_stop(&self) -> Result<()> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::stopped()) } else { Ok(()) }
@@ -68,9 +82,9 @@ impl<'a> Context<'a> {
     /// Checks that a stage gets the memory that it cannot do without, beside that of the program itself.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`], with what it needs.
+    /// As [`Allowance::require`].
     pub fn require(&self, what: &str, bytes: u64) -> Result<()> {
-        budget::require(what, bytes.saturating_add(budget::OWN_BYTES), self.memory_bytes)
+        self.memory().require(what, bytes.saturating_add(budget::OWN_BYTES), "")
     }
 
     /// Memory for the work itself.

@@ -65,7 +65,28 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
             .iter()
             .find_map(|key| first_difference(&entry(old, key), &entry(new, key), &format!("{place}{key} ")));
     }
-    (old != new).then(|| format!("{place}was {old}, now {new}"))
+    let place = place.trim_end();
+    (old != new).then(|| match (old.as_str(), new.as_str()) {
+        // Of what was made before only the digest is known.
+        (Some(old), Some(new)) if is_digest(old) && is_digest(new) => format!(
+            "its {place} was made anew since, or is another one (digest {}, now {})",
+            &old[..SHOWN],
+            &new[..SHOWN]
+        ),
+        _ => format!("{place} was {}, now {}", shown(old), shown(new)),
+    })
+}
+
+/// A setting; one that is null was left to the program.
+fn shown(value: &Value) -> String {
+    if value.is_null() { "not given".to_owned() } else { value.to_string() }
+}
+
+/// Characters of a digest that are shown.
+const SHOWN: usize = 12;
+
+fn is_digest(text: &str) -> bool {
+    text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 #[cfg(test)]

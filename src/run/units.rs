@@ -6,10 +6,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::error::Result;
 use crate::run::{Context, spawn};
 
-/// Units that may be in flight: one a thread, fewer where memory does not allow it, at least one.
-pub fn in_flight(context: &Context<'_>, unit_bytes: u64) -> usize {
+/// Units that may be in flight: one a thread, fewer where memory does not allow it. `what` one of them is stands in the
+/// error.
+///
+/// # Errors
+/// Where memory does not even allow one.
+pub fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<usize> {
+    context.require(what, unit_bytes)?;
     let affordable = context.work_bytes() / unit_bytes.max(1);
-    (context.threads.max(1) as u64).min(affordable).max(1) as usize
+    Ok((context.threads.max(1) as u64).min(affordable).max(1) as usize)
 }
 
 /// Runs `work` on every unit, at most `in_flight` at a time, in the order given.
@@ -96,6 +101,8 @@ mod tests {
     #[test]
     fn memory_bounds_the_units_in_flight() {
         let stop = AtomicBool::new(false);
-        assert_eq!([10, 30, 60, 1000].map(|bytes| in_flight(&context(&stop), bytes)), [4, 3, 1, 1]);
+        let in_flight = |bytes| in_flight(&context(&stop), "a unit", bytes);
+        assert_eq!([10, 30, 60, 100].map(|bytes| in_flight(bytes).unwrap()), [4, 3, 1, 1]);
+        assert_eq!(in_flight(101).unwrap_err().kind(), Kind::Usage);
     }
 }

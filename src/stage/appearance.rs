@@ -55,7 +55,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
-        json!({"stage": "appearance", "model": self.model.path(), "recipe": self.recipe})
+        json!({"stage": "appearance", "model": self.model.path().display().to_string(), "recipe": self.recipe})
     }
 
     /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.

@@ -58,11 +58,25 @@ pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Rep
 /// All diagnoses. Images with one fault are not blamed for what follows from it.
 pub fn examine(statistics: &Statistics) -> Report {
     let mut checks =
-        vec![samples::numbers(statistics), samples::black(statistics), samples::saturation(statistics)];
-    checks.push(duplicates::check(statistics));
+        vec![samples::numbers(statistics), samples::black(statistics), samples::contrast(statistics)];
     let put_off = |names: &[&'static str], reason: &str| -> Vec<Check> {
         names.iter().map(|name| Check::not_checked(name, format!("{reason}: repair that first"))).collect()
     };
+    if has_fault(&checks, samples::CONTRAST) {
+        let names = [
+            samples::SATURATION,
+            duplicates::NAME,
+            radiometry::NAME,
+            azimuth::NAME,
+            misplaced::NAME,
+            exposure::NAME,
+            registration::NAME,
+        ];
+        checks.extend(put_off(&names, "no image shows anything"));
+        return Report { checks };
+    }
+    checks.push(samples::saturation(statistics));
+    checks.push(duplicates::check(statistics));
     if has_fault(&checks, samples::SATURATION) {
         checks.push(azimuth::check(statistics));
         let names = [radiometry::NAME, misplaced::NAME, exposure::NAME];

@@ -138,7 +138,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let views: Vec<usize> = (0..description.views.len()).collect();
     context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
     let window_bytes = 2 * (bounds.size.texels() * description.texel_bytes()) as u64;
-    let in_flight = units::in_flight(context, window_bytes);
+    let in_flight = units::in_flight(context, &format!("comparing views of {}", bounds.size), window_bytes)?;
     let sums = units::for_each(context, &views, in_flight, |&view| {
         let window = measurement.read_reflectance(view, bounds)?;
         let mut sums = Sums { views: 1, ..Sums::default() };

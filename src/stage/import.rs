@@ -17,6 +17,7 @@ use crate::shape::Size;
 use crate::store::codec::Chain;
 use crate::store::gather::Images;
 use crate::store::measurement::{Description, Measurement, Origin};
+use crate::words::counted;
 
 /// How an archive is turned into a measurement.
 #[derive(Clone, Debug)]
@@ -127,7 +128,7 @@ impl Plan<'_> {
     pub fn summary(&self) -> Value {
         json!({
             "stage": "import",
-            "store": self.options.store,
+            "store": self.options.store.display().to_string(),
             "size": self.description.size.to_string(),
             "views": self.description.views.len(),
             "lights": self.description.lights.len(),
@@ -165,9 +166,9 @@ impl Plan<'_> {
     /// Imports the views that are not in the store yet.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let unit = format!(
-            "importing views of {} under {} lights",
+            "importing views of {} under {}",
             self.description.size,
-            self.description.lights.len()
+            counted(self.description.lights.len(), "light")
         );
         context.require(&unit, self.unit_bytes())?;
         let contents = self.source.contents();
@@ -266,7 +267,9 @@ pub(crate) fn read_view(
 
 /// The store that an archive goes to where none is named: its name with `.zarr`, in a folder.
 pub fn default_store(archive: &Path, folder: &Path) -> PathBuf {
-    folder.join(format!("{}.zarr", archive.file_stem().unwrap_or_default().to_string_lossy()))
+    let mut name = archive.file_stem().unwrap_or_default().to_owned();
+    name.push(".zarr");
+    folder.join(name)
 }
 
 #[cfg(test)]

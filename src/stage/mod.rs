@@ -13,6 +13,7 @@ pub mod fit;
 pub mod image;
 pub mod import;
 pub mod judge;
+pub mod loss;
 pub mod normals;
 pub mod sample;
 pub mod tile;

@@ -67,7 +67,7 @@ const TEXEL_BYTES: u64 = 48;
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
-        json!({"stage": "normals", "model": self.model.path(), "recipe": self.recipe})
+        json!({"stage": "normals", "model": self.model.path().display().to_string(), "recipe": self.recipe})
     }
 
     /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.

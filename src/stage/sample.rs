@@ -13,6 +13,7 @@ use crate::run::progress::Counted;
 use crate::sample::{Kind, Scene, Surface};
 use crate::shape::Size;
 use crate::store::output::{self, Made};
+use crate::words::counted;
 
 /// Memory of a texel of the surface beside its images (measured).
 const TEXEL_BYTES: u64 = 500;
@@ -85,7 +86,8 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let Size { height, width } = options.size;
     let texels = options.size.texels() as u64;
     let needed = texels * (TEXEL_BYTES + 2 * 3 * lights.len() as u64);
-    context.require(&format!("a sample of {} under {} lights", options.size, lights.len()), needed)?;
+    context
+        .require(&format!("a sample of {} under {}", options.size, counted(lights.len(), "light")), needed)?;
     let surface = Surface::new(options.kind, width, height, options.scale, options.seed)?;
     let light_angles: Vec<[f64; 2]> = lights.iter().map(radians).collect();
     context.progress.begin("sample", (views.len() * lights.len()) as u64, Counted::Items("images"));

@@ -13,7 +13,7 @@ use crate::shape::{Size, Window};
 use crate::store::checksums::DIGITS;
 use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::{NARROW, Stage, is_unit};
-use crate::store::model_place;
+use crate::store::origin;
 use crate::store::{Array, DAMAGED, Layout, Lock, Named, Store};
 
 /// The attribute `kind` of an enlarged index store.
@@ -166,7 +166,7 @@ impl Enlarged {
             "model_name": model_name, "clusters": clusters, "tile": [tile.height, tile.width],
         });
         let lock = store.begin_by_recipe(KIND, recipe, more, context)?;
-        model_place::note(path, model)?;
+        origin::note(path, origin::MODEL, model, None)?;
         let facts = Facts::read(&store)?;
         let index = store.create_array("index", &index_layout(size, clusters > NARROW))?;
         let source =

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::mapped::{host, same_file};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_denied};
 use crate::run::Context;
 
 /// How lock files begin.
@@ -53,6 +53,8 @@ impl Lock {
         loop {
             let mut file = match open(&place) {
                 Ok(file) => file,
+                // Whoever cannot write there has nothing to keep others from; what is left to do fails where it writes.
+                Err(error) if is_denied(&error) && path.is_dir() => return Ok(Self { held: None }),
                 Err(error) => return Err(Error::io("write", &place, error)),
             };
             match if shared { file.try_lock_shared() } else { file.try_lock() } {

@@ -96,6 +96,26 @@ pub(crate) fn publish(temporary: &Path, path: &Path) -> io::Result<()> {
     File::open(folder_of(path))?.sync_all()
 }
 
+/// As [`publish`], but never in place of another file: no process can come between the look and the deed. The temporary
+/// name may stay.
+///
+/// # Errors
+/// [`io::ErrorKind::AlreadyExists`] where the name is taken.
+pub(crate) fn publish_new(temporary: &Path, path: &Path) -> io::Result<()> {
+    File::open(temporary)?.sync_all()?;
+    match fs::hard_link(temporary, path) {
+        // Some file systems have no second names.
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+            if path.symlink_metadata().is_ok() {
+                return Err(io::ErrorKind::AlreadyExists.into());
+            }
+            fs::rename(temporary, path)?;
+        }
+        linked => linked?,
+    }
+    File::open(folder_of(path))?.sync_all()
+}
+
 /// A file or folder that is being made beside the place that it is to have. It holds a lock while it lives; dropped
 /// before it is published, it leaves nothing.
 #[derive(Debug)]
@@ -125,7 +145,11 @@ impl Temporary {
         loop {
             let temporary = temporary_name(path);
             fs::create_dir_all(&temporary)?;
-            let held = File::open(&temporary)?;
+            // A sweep may have come between.
+            let held = match File::open(&temporary) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                opened => opened?,
+            };
             let _ = held.lock();
             if same_file(&held, &temporary) {
                 return Ok(Self { path: temporary, held, is_folder: true, published: false });
@@ -149,6 +173,27 @@ impl Temporary {
         fs::rename(&self.path, path)?;
         self.published = true;
         File::open(folder_of(path))?.sync_all()
+    }
+
+    /// Gives a folder its name, unless there is something of that name (an empty folder is nothing).
+    pub(crate) fn publish_folder(&mut self, path: &Path) -> io::Result<()> {
+        self.held.sync_all()?;
+        fs::rename(&self.path, path)?;
+        self.published = true;
+        File::open(folder_of(path))?.sync_all()
+    }
+
+    /// Puts a folder in the place of another one. Where a process that does the same was faster, the name is taken again.
+    pub(crate) fn replace_folder(&mut self, path: &Path) -> io::Result<()> {
+        let old = temporary_name(path);
+        let gone = |result: io::Result<()>| match result {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+            other => other,
+        };
+        gone(fs::rename(path, &old))?;
+        let published = self.publish_folder(path);
+        gone(fs::remove_dir_all(&old))?;
+        published
     }
 
     /// Removes what killed writers of the same output left beside it.
@@ -369,6 +414,11 @@ fn slice(bytes: &Bytes, range: ByteRange) -> std::result::Result<Bytes, StorageE
 impl WritableStorageTraits for MappedStorage {
     fn set(&self, key: &StoreKey, value: Bytes) -> std::result::Result<(), StorageError> {
         let path = self.path(key);
+        // What is finished is found done where nothing can be written, too.
+        let same_length = fs::metadata(&path).is_ok_and(|data| data.len() == value.len() as u64);
+        if same_length && map_file(&path).is_ok_and(|found| found == value) {
+            return Ok(());
+        }
         write_atomically(&path, &value).map_err(|error| storage_error(&path, "write", &error))
     }
 

@@ -17,7 +17,7 @@ pub mod mapped;
 pub mod measurement;
 pub mod metadata;
 pub mod model;
-pub(crate) mod model_place;
+pub(crate) mod origin;
 pub mod output;
 pub mod passes;
 mod places;
@@ -316,6 +316,7 @@ impl Store {
     /// # Errors
     /// As [`Store::expect`].
     pub fn expect_one_of(&self, kinds: &[&str]) -> Result<Map<String, Value>> {
+        recognise::expect_readable(&self.path)?;
         let Some(found) = self.attributes()? else {
             let other = match self.metadata_path("").exists() {
                 true => Some(recognise::foreign(&self.path)?),

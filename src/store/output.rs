@@ -9,7 +9,7 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use super::mapped::{self, MappedFile, Temporary, folder_of, open, publish, temporary_name, write_file};
+use super::mapped::{self, MappedFile, Temporary, folder_of, open, write_file};
 use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
@@ -123,46 +123,88 @@ impl std::fmt::Display for Different {
 
 impl std::error::Error for Different {}
 
-/// Writes a file by `write`; it gets its name when that is done.
+/// A file that is written or found done, and gets its name by [`Ready::publish`]: of several that belong together none is
+/// published before all are ready.
+#[must_use]
+pub struct Ready {
+    path: PathBuf,
+    existing: Existing,
+    /// None where it was found done.
+    temporary: Option<Temporary>,
+}
+
+impl Ready {
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`Kind::Recipe`] where another process has made another file of this name meanwhile.
+    pub fn publish(self) -> Result<Made> {
+        match self.temporary {
+            None => Ok(Made::Found),
+            Some(temporary) => settle(temporary.path(), &self.path, self.existing),
+        }
+    }
+}
+
+/// Writes a file by `write` beside the place that it is to have, or compares it with the one that is there.
 ///
 /// # Errors
 /// Those of `write`, and [`Kind::Recipe`] where another file has the name.
+pub fn prepare(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&mut Output) -> Result<()>,
+) -> Result<Ready> {
+    let ready = |temporary| Ready { path: path.to_owned(), existing, temporary };
+    if existing == Existing::Keep && is_there(path) {
+        return compare(path, write).map(|()| ready(None));
+    }
+    existing.expect_free(path)?;
+    written(path, write).map(|temporary| ready(Some(temporary)))
+}
+
+/// As [`prepare`], for a `write` that goes back and changes what it wrote, so that only the end can be compared: the file
+/// is written under another name first.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_seeking(
+    path: &Path,
+    existing: Existing,
+    write: impl FnOnce(&mut Output) -> Result<()>,
+) -> Result<Ready> {
+    let found = existing == Existing::Keep && is_there(path);
+    if !found {
+        existing.expect_free(path)?;
+    }
+    let temporary = written(path, write)?;
+    if found {
+        compare_files(temporary.path(), path)?;
+    }
+    Ok(Ready { path: path.to_owned(), existing, temporary: (!found).then_some(temporary) })
+}
+
+/// Publishes files that belong together; written, if one of them was.
+///
+/// # Errors
+/// As [`Ready::publish`].
+pub fn publish_all(files: impl IntoIterator<Item = Ready>) -> Result<Made> {
+    files.into_iter().try_fold(Made::Found, |made, file| {
+        let published = file.publish()?;
+        Ok(if made == Made::Written { made } else { published })
+    })
+}
+
+/// Writes a file by `write`; it gets its name when that is done.
+///
+/// # Errors
+/// As [`prepare`] and [`Ready::publish`].
 pub fn write_whole(
     path: &Path,
     existing: Existing,
     write: impl FnOnce(&mut Output) -> Result<()>,
 ) -> Result<Made> {
-    if existing == Existing::Keep && is_there(path) {
-        return compare(path, write);
-    }
-    existing.expect_free(path)?;
-    let temporary = written(path, write)?;
-    // Another may have taken the name meanwhile.
-    existing.expect_free(path)?;
-    temporary.publish(path).map_err(|error| Error::io("write", path, error))?;
-    Ok(Made::Written)
-}
-
-/// As [`write_whole`], for a `write` that goes back and changes what it wrote, so that only the end can be compared: the
-/// file is written under another name first.
-///
-/// # Errors
-/// As [`write_whole`].
-pub fn write_whole_seeking(
-    path: &Path,
-    existing: Existing,
-    write: impl FnOnce(&mut Output) -> Result<()>,
-) -> Result<Made> {
-    if existing == Existing::Replace {
-        existing.expect_free(path)?;
-    }
-    let temporary = written(path, write)?;
-    if existing == Existing::Keep && is_there(path) {
-        return settle(temporary.path(), path, existing);
-    }
-    existing.expect_free(path)?;
-    temporary.publish(path).map_err(|error| Error::io("write", path, error))?;
-    Ok(Made::Written)
+    prepare(path, existing, write)?.publish()
 }
 
 /// A file beside `path` that `write` has filled.
@@ -179,7 +221,7 @@ fn written(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
 }
 
 /// Compares a file that is there with what `write` writes.
-fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<Made> {
+fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<()> {
     let failed = |error| Error::io("read", path, error);
     if !path.is_file() {
         return Err(taken(path, "exists and is no file").hint("choose another name for the result"));
@@ -196,7 +238,14 @@ fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
     }
     // What was written last need not be the end: some formats go back to their head.
     let end = output.seek(SeekFrom::End(0)).map_err(failed)?;
-    if end == length { Ok(Made::Found) } else { Err(taken(path, &Different.to_string())) }
+    if end == length { Ok(()) } else { Err(taken(path, &Different.to_string())) }
+}
+
+/// Compares a file that was made with the one that is there.
+fn compare_files(made: &Path, path: &Path) -> Result<()> {
+    let failed = |error| Error::io("read", path, error);
+    let mut made = BufReader::with_capacity(BUFFER_BYTES, open(made).map_err(failed)?);
+    compare(path, |output| io::copy(&mut made, output).map(|_| ()).map_err(failed))
 }
 
 /// A folder that is filled, or compared with the one that is there.
@@ -224,12 +273,37 @@ impl Folder {
         }
     }
 
+    /// Whether every file that was put into this one lies in a folder too, the same to the byte.
+    fn is_in(&self, folder: &Path) -> Result<bool> {
+        let names = self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for name in names.iter() {
+            let (ours, theirs) = (self.root.join(name), folder.join(name));
+            let made = MappedFile::open(&ours).map_err(|error| Error::io("read", &ours, error))?;
+            match MappedFile::open(&theirs) {
+                Ok(found) if found.as_ref() == made.as_ref() => {}
+                Ok(_) => return Ok(false),
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) =>
+                {
+                    return Ok(false);
+                }
+                Err(error) => return Err(Error::io("read", &theirs, error)),
+            }
+        }
+        Ok(true)
+    }
+
     /// Whether a folder holds no file but those that were put into this one.
     fn holds_all_of(&self, folder: &Path) -> Result<bool> {
         let names = self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let mut folders = vec![folder.to_owned()];
         while let Some(at) = folders.pop() {
-            for entry in fs::read_dir(&at).map_err(|error| Error::io("list", &at, error))? {
+            let entries = match fs::read_dir(&at) {
+                // Another process has moved it away, and will make it anew.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                entries => entries.map_err(|error| Error::io("list", &at, error))?,
+            };
+            for entry in entries {
                 let entry = entry.map_err(|error| Error::io("list", &at, error))?;
                 if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                     folders.push(entry.path());
@@ -268,44 +342,69 @@ pub fn write_whole_folder(
         return if found.holds_all_of(path)? { Ok(Made::Found) } else { Err(different_folder(path)) };
     }
     Temporary::sweep_beside(path);
-    let temporary = Temporary::folder(path).map_err(failed)?;
+    let mut temporary = Temporary::folder(path).map_err(failed)?;
     let filled = folder(temporary.path(), false);
     write(&filled).map_err(|error| error.at(path))?;
-    if occupied {
-        if !filled.holds_all_of(path)? {
+    let mut published = temporary.publish_folder(path);
+    loop {
+        match published {
+            Ok(()) => return Ok(Made::Written),
+            Err(error) if !is_taken(&error) => return Err(failed(error)),
+            Err(_) => {}
+        }
+        let alone = filled.holds_all_of(path)?;
+        if existing == Existing::Keep {
+            // Another process was faster.
+            return if alone && filled.is_in(path)? { Ok(Made::Found) } else { Err(meanwhile(path)) };
+        }
+        if !alone {
             return Err(Error::recipe(format!(
                 "{} holds other files too, so it is not replaced",
                 path.display()
             ))
             .hint("choose another name for the result"));
         }
-        let old = temporary_name(path);
-        fs::rename(path, &old).map_err(failed)?;
-        temporary.publish(path).map_err(failed)?;
-        fs::remove_dir_all(&old).map_err(failed)?;
-        return Ok(Made::Written);
+        published = temporary.replace_folder(path);
     }
-    temporary.publish(path).map_err(failed)?;
-    Ok(Made::Written)
 }
 
-/// Writes the bytes of a small file whose name must be free, or may be replaced.
-pub fn write_new(path: &Path, existing: Existing, bytes: &[u8]) -> Result<Made> {
-    write_whole(path, existing, |output| {
-        output.write_all(bytes).map_err(|error| Error::io("write", path, error))
-    })
+/// [`prepare`] for the bytes of a small file.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_bytes(path: &Path, existing: Existing, bytes: &[u8]) -> Result<Ready> {
+    prepare(path, existing, |output| output.write_all(bytes).map_err(|error| Error::io("write", path, error)))
 }
 
-/// Gives a file that another library wrote its name, under the same rule as [`write_whole`].
+/// Gives a file that is written its name, under the rule of [`write_whole`]. Of two processes that make the same file
+/// the second finds it done.
+///
+/// # Errors
+/// [`Kind::Recipe`] where another file has the name.
 pub fn settle(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
-    if existing == Existing::Replace || !is_there(path) {
+    let failed = |error| Error::io("write", path, error);
+    if existing == Existing::Replace {
         existing.expect_free(path)?;
-        publish(temporary, path).map_err(|error| Error::io("write", path, error))?;
-        return Ok(Made::Written);
+        return mapped::publish(temporary, path).map(|()| Made::Written).map_err(failed);
     }
-    let failed = |error| Error::io("read", path, error);
-    let mut made = BufReader::with_capacity(BUFFER_BYTES, open(temporary).map_err(failed)?);
-    compare(path, |output| {
-        io::copy(&mut made, output).map(|_| ()).map_err(|error| Error::io("write", path, error))
-    })
+    match mapped::publish_new(temporary, path) {
+        Ok(()) => Ok(Made::Written),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            compare_files(temporary, path).map(|()| Made::Found).map_err(|error| match error.kind() {
+                Kind::Recipe => meanwhile(path),
+                _ => error,
+            })
+        }
+        Err(error) => Err(failed(error)),
+    }
+}
+
+/// The error of a name that was free when the work began.
+fn meanwhile(path: &Path) -> Error {
+    taken(path, "was made by another process meanwhile, and holds something else")
+}
+
+/// What a system says of a folder that would take the place of one that holds something.
+fn is_taken(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::AlreadyExists | io::ErrorKind::DirectoryNotEmpty)
 }

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::mapped::{is_temporary, open, special};
 use super::metadata::read_object;
 use super::{enlarged, is_lock, measurement, model};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, is_loop};
 
 /// Bytes that tell one file from another.
 const HEAD_BYTES: u64 = 4096;
@@ -44,6 +44,35 @@ enum Use {
     Nothing,
     /// A sentence.
     Advice(&'static str),
+}
+
+/// Checks that a path is no link that leads nowhere, and no pipe, socket or device: nothing can be there to be read.
+///
+/// # Errors
+/// [`crate::Kind::Missing`], with what it is, or leads to.
+pub fn expect_readable(path: &Path) -> Result<()> {
+    // With a slash behind it, a link would be followed.
+    let path: std::path::PathBuf = path.components().collect();
+    let error = match std::fs::metadata(&path) {
+        Ok(data) => {
+            return match special(&data).filter(|_| !data.is_dir()) {
+                Some(what) => {
+                    Err(Error::missing(format!("{} is {what}, expected a file or a folder", path.display()))
+                        .hint("copy its contents into a file, and name that"))
+                }
+                None => Ok(()),
+            };
+        }
+        Err(error) => error,
+    };
+    let Ok(to) = path.read_link() else { return Ok(()) };
+    let what = match error.kind() {
+        std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory => "where nothing is".to_owned(),
+        _ if is_loop(&error) => "and leads back to itself".to_owned(),
+        _ => format!("where nothing can be read: {error}"),
+    };
+    Err(Error::missing(format!("{} is a link to {}, {what}", path.display(), to.display()))
+        .hint("mend the link, or name what it was to lead to"))
 }
 
 /// What lies at a path that has no `zarr.json` of ours; `None` for nothing, or an empty folder.
@@ -110,6 +139,7 @@ fn of_folder(path: &Path) -> Result<Option<Other>> {
     }
     let entries = std::fs::read_dir(path).map_err(|error| Error::io("list", path, error))?;
     let mut is_empty = true;
+    let mut has_arrays = false;
     for entry in entries.take(MOST_ENTRIES) {
         let entry = entry.map_err(|error| Error::io("list", path, error))?.path();
         // What a killed writer left of its first file is nothing.
@@ -117,10 +147,15 @@ fn of_folder(path: &Path) -> Result<Option<Other>> {
             continue;
         }
         is_empty = false;
+        has_arrays |= entry.join("zarr.json").is_file();
         let ending = entry.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
         if ["jpg", "jpeg", "png", "tif", "tiff", "exr", "hdr"].contains(&ending.as_str()) {
             return Ok(Some(Other { what: "a folder of pictures".to_owned(), use_it: Use::Import }));
         }
+    }
+    if has_arrays {
+        let what = "a store that has lost its zarr.json".to_owned();
+        return Ok(Some(Other { what, use_it: Use::Advice("make it again under another name") }));
     }
     let folder = || Other { what: "a folder without a zarr.json".to_owned(), use_it: Use::Import };
     Ok((!is_empty).then(folder))

@@ -533,3 +533,63 @@ fn the_program_exits_by_what_it_finds_and_draws_it() {
     let nothing: TempDir = folder;
     fail(btf().arg("check").arg(nothing.path().join("none.zarr")), 66);
 }
+
+/// A measurement of 9 x 19 images whose samples are all given by a function of image, texel and channel.
+fn made_of(value: impl Fn(usize, usize, usize) -> f32 + Sync) -> Report {
+    struct Made<F>(Description, F);
+    impl<F: Fn(usize, usize, usize) -> f32 + Sync> Views for Made<F> {
+        fn description(&self) -> &Description {
+            &self.0
+        }
+        fn read_view(&self, view: usize, _: Window) -> btfkit::error::Result<Samples> {
+            let (lights, texels) = (self.0.lights.len(), self.0.size.texels());
+            let samples = (0..texels).flat_map(|texel| {
+                (0..lights).flat_map(move |light| {
+                    (0..3).map(move |channel| (self.1)(view * lights + light, texel, channel))
+                })
+            });
+            Ok(Samples::F32(samples.collect()))
+        }
+    }
+    let mut description = Measurement::open(&fixture().measurement()).unwrap().description().clone();
+    description.sample_type = btfkit_formats::SampleType::F32;
+    description.transfer = Transfer::Linear;
+    let stop = AtomicBool::new(false);
+    let context = Context::new(&Silent, &stop, 2, 1 << 30).unwrap();
+    let made = Made(description, value);
+    check::run(&made, &context).unwrap().1
+}
+
+#[test]
+fn a_measurement_that_shows_nothing_has_a_fault_and_passes_no_other_check() {
+    let of_image = |image: usize| 0.2 + (image as f32) * 1e-3;
+    let nothing: [(&str, Report); 6] = [
+        ("black", made_of(|_, _, _| 0.0)),
+        ("not a number", made_of(|_, _, _| f32::NAN)),
+        ("infinite", made_of(|_, _, _| f32::INFINITY)),
+        ("constant", made_of(|_, _, _| 0.5)),
+        ("of one colour", made_of(|_, _, channel| [0.5, 0.3, 0.1][channel])),
+        ("of one value an image", made_of(|image, _, _| of_image(image))),
+    ];
+    for (name, report) in nothing {
+        let codes: Vec<&str> = report.faults().map(|fault| fault.code).collect();
+        assert!(codes.contains(&"no-contrast"), "{name}: {codes:?}");
+        let rest = report
+            .checks
+            .iter()
+            .filter(|check| !["numbers", "black-images", "contrast"].contains(&check.name));
+        assert!(rest.clone().count() >= 7, "{name}");
+        for check in rest {
+            assert_eq!(check.state, State::NotChecked, "{name}: {}", check.name);
+        }
+    }
+    // One plain image among others is a suspicion and no duplicate.
+    let some = made_of(
+        |image, texel, _| {
+            if image < 2 { 0.4 } else { of_image(image) + ((texel + image) % 11) as f32 / 50.0 }
+        },
+    );
+    let plain: Vec<_> = some.findings().filter(|finding| finding.code == "plain-image").collect();
+    assert_eq!((plain.len(), plain[0].severity, plain[0].directions.len()), (1, Severity::Suspicion, 2));
+    assert!(some.findings().all(|finding| finding.code != "duplicate-image"));
+}

@@ -394,6 +394,8 @@ fn what_a_model_lacks_is_told_with_the_command_that_makes_it() {
     let other = folder.path().join("other.zarr");
     let told = fail(&mut image(&["--values", "measured", "--measurement", other.to_str().unwrap()]), 66);
     assert!(!told.contains("name the measurement with"), "{told}");
+    // Where it lay is not known any more.
+    std::fs::remove_file(model.join("measurement-path")).unwrap();
     let told = fail(&mut image(&["--values", "measured"]), 66);
     assert!(told.contains("name the measurement with --measurement"), "{told}");
 }
@@ -428,4 +430,24 @@ fn errors_are_json_where_progress_is_with_what_to_do() {
     let told = fail(&mut command, 2);
     let error: serde_json::Value = serde_json::from_str(told.lines().last().unwrap()).unwrap();
     assert!(error.as_object().unwrap().contains_key("advice"), "{error}");
+}
+
+#[test]
+fn numbers_that_no_option_takes_are_told_in_words_that_help() {
+    for arguments in [&["info", "-1"][..], &["enlarge", "m", "o", "--size", "64x64", "-2.5"]] {
+        let told = fail(btf().args(arguments), 2);
+        assert!(told.contains("behind the option that it is for") && !told.contains("use '-- -"), "{told}");
+    }
+    for arguments in [
+        &["cluster", "s", "m", "--clusters", "-5"][..],
+        &["cluster", "s", "m", "--seed", "1.5"],
+        &["fit", "m", "--levels", "x"],
+        &["import", "a", "--drop-view", "-1"],
+    ] {
+        let told = fail(btf().args(arguments), 2);
+        assert!(
+            told.contains("expected a whole number, 0 or more") && told.starts_with("error: invalid value"),
+            "{told}"
+        );
+    }
 }

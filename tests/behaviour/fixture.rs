@@ -115,11 +115,13 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Asserts that two stores hold the same files with the same bytes, but for the note of where an index's model lies.
+/// Asserts that two stores hold the same files with the same bytes, but for the notes of where their origins lie.
 pub fn assert_same(first: &Path, second: &Path) {
     let made = |store: &Path| {
         let mut files = tree(store);
-        files.remove(Path::new("model-path"));
+        for name in ["model-path", "measurement-path"] {
+            files.remove(Path::new(name));
+        }
         files
     };
     let (a, b) = (made(first), made(second));

@@ -676,3 +676,98 @@ fn a_tile_of_few_texels_has_as_many_clusters_and_only_a_given_number_is_refused(
     let told = succeed(btf().arg("cluster").args([&store, &model]).arg("--dry-run"));
     assert!(told.contains("\"clusters\": 144"), "{told}");
 }
+
+#[test]
+fn a_signal_while_it_computes_is_told_as_json_where_progress_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let [archive, store, model] = ["s.zip", "s.zarr", "s.model.zarr"].map(|name| folder.path().join(name));
+    succeed(btf().arg("sample").arg(&archive).args(["--size", "400x400", "--views", "1", "--lights", "4"]));
+    succeed(btf().arg("import").args([&archive, &store]));
+    let mut child = btf()
+        .arg("tile")
+        .args([&store, &model])
+        .args(["--tile", "cut", "--progress", "json"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The second stage of the work begins when the first line has come.
+    let mut errors = std::io::BufReader::new(child.stderr.take().unwrap());
+    let mut told = String::new();
+    std::io::BufRead::read_line(&mut errors, &mut told).unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    let _ = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    std::io::Read::read_to_string(&mut errors, &mut told).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(75), "{told}");
+    for line in told.lines() {
+        serde_json::from_str::<serde_json::Value>(line).unwrap_or_else(|_| panic!("no JSON: {line}"));
+    }
+    assert!(told.lines().last().unwrap().contains("\"exit_code\":75"), "{told}");
+}
+
+#[test]
+fn less_memory_than_a_command_takes_is_refused_with_what_it_takes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = |name: &str| folder.path().join(name).display().to_string();
+    let [archive, measurement, model, enlarged] =
+        [fixture().archive(), fixture().measurement(), fixture().model(), fixture().enlarged()]
+            .map(|path| path.display().to_string());
+    for command in [
+        format!("import {archive} {}", out("o.zarr")),
+        format!("export {measurement} {}", out("o.npy")),
+        format!("check {measurement}"),
+        format!("check {archive}"),
+        format!("verify {measurement}"),
+        format!("verify {model}"),
+        format!("verify {enlarged}"),
+        format!("info {measurement}"),
+        format!("model {measurement} {}", out("o.model.zarr")),
+        format!("tile {measurement} {}", out("o.model.zarr")),
+        format!("compare {measurement} {model}"),
+        format!("enlarge {model} {} --size 64x64", out("b.zarr")),
+        format!("image {measurement} --out {}", out("i.png")),
+        format!("export {measurement} {}", out("i.dzi")),
+        format!("sample {} --size 64x64", out("s.zip")),
+        format!("judge {enlarged} --against {measurement}"),
+    ] {
+        for (memory, allowed) in
+            [("1", "1 byte is allowed"), ("2500", "2 KiB are allowed"), ("5MiB", "5 MiB are allowed")]
+        {
+            let told = fail(btf().args(command.split(' ')).args(["--memory", memory]), 2);
+            assert!(
+                told.contains(allowed) && told.contains("--memory ") && told.contains(" takes "),
+                "{command}: {told}"
+            );
+        }
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "something was begun");
+    fail(btf().arg("info").arg(&model).args(["--memory", "0"]), 2);
+}
+
+#[test]
+fn less_address_space_than_it_takes_is_an_error_of_the_system_and_no_advice_to_allow_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |kibibytes: u32, command: &str| {
+        let mut shell = Command::new("sh");
+        let program = env!("CARGO_BIN_EXE_btf");
+        shell
+            .arg("-c")
+            .arg(format!("ulimit -v {kibibytes}; exec {program} {command}"))
+            .env("RUST_BACKTRACE", "0");
+        shell
+    };
+    let out = folder.path().join("o").display().to_string();
+    let (archive, measurement) = (fixture().archive(), fixture().measurement());
+    let told = fail(&mut limited(150_000, &format!("sample {out}.zip --size 1000x1000")), 1);
+    assert!(told.contains("ulimit -v") && !told.contains("--memory"), "{told}");
+    for command in [
+        format!("import {} {out}.zarr", archive.display()),
+        format!("check {}", measurement.display()),
+        format!("verify {}", measurement.display()),
+        format!("image {} --out {out}.png", measurement.display()),
+        format!("enlarge {} {out}-big.zarr --size 500x500", fixture().model().display()),
+    ] {
+        // Threads have no arenas of their own, which would reserve more than is there.
+        succeed(&mut limited(400_000, &command));
+    }
+}

@@ -11,6 +11,7 @@ use serde_json::json;
 use super::angular::angle;
 use super::finding::{Check, Finding, Place, Severity, confidence, names, round};
 use super::statistics::Statistics;
+use crate::words::counted;
 use btfkit_formats::Direction;
 
 /// Name of the check.
@@ -47,7 +48,9 @@ pub fn check(statistics: &Statistics) -> Check {
     let mut candidates: Vec<Candidate<'_>> = (0..statistics.images.len())
         .map(|at| (at / lights, at % lights))
         .filter(|&(view, light)| {
-            !statistics.is_black(view, light) && statistics.clipped_share(view, light) < CLIPPED
+            !statistics.is_black(view, light)
+                && !statistics.is_plain(view, light)
+                && statistics.clipped_share(view, light) < CLIPPED
         })
         .map(|(view, light)| {
             let image = statistics.image(view, light);
@@ -62,6 +65,13 @@ pub fn check(statistics: &Statistics) -> Check {
             }
         })
         .collect();
+    if candidates.len() < 2 {
+        let found = counted(candidates.len(), "image");
+        return Check::not_checked(
+            NAME,
+            format!("{found} that can be compared (black, plain or clipped ones cannot)"),
+        );
+    }
     let equal = equal(&candidates);
     candidates.sort_by(|a, b| a.mean.total_cmp(&b.mean));
     let (least, near) = nearly_equal(&candidates);

@@ -11,6 +11,7 @@ use serde_json::json;
 use super::angular::{Alike, Neighbourhood, angle};
 use super::finding::{Check, Finding, Place, Severity, confidence, listed, names, round};
 use super::statistics::{Statistics, deviation, median};
+use crate::words::counted;
 
 /// Name of the check.
 pub const NAME: &str = "exposure";
@@ -123,8 +124,8 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
         return Check::not_checked(
             NAME,
             format!(
-                "{} lights {:.0} degrees apart predict each other too badly, expected {SPACING_DEG} at most",
-                statistics.lights.len(),
+                "{} {:.0} degrees apart predict each other too badly, expected {SPACING_DEG} at most",
+                counted(statistics.lights.len(), "light"),
                 near_lights.spacing_rad.to_degrees()
             ),
         );

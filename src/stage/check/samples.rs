@@ -10,6 +10,8 @@ use crate::words::counted;
 pub const NUMBERS: &str = "numbers";
 /// Name of the check for images on which nothing is.
 pub const BLACK: &str = "black-images";
+/// Name of the check for images that are of one brightness.
+pub const CONTRAST: &str = "contrast";
 /// Name of the check for clipping.
 pub const SATURATION: &str = "saturation";
 
@@ -124,6 +126,47 @@ pub fn black(statistics: &Statistics) -> Check {
         directions: found,
     };
     Check::done(BLACK, detail, alarm, vec![finding])
+}
+
+/// Looks for images on which nothing is to be seen, though they need not be black.
+pub fn contrast(statistics: &Statistics) -> Check {
+    let plain: Vec<Place> = places(statistics)
+        .filter(|&(view, light)| statistics.is_plain(view, light))
+        .map(|(view, light)| Place::image(view, light))
+        .collect();
+    let all = statistics.images.len();
+    let nothing = plain.len() == all;
+    // Single black ones are told as such.
+    let is_black = |place: &Place| statistics.is_black(place.view.unwrap_or(0), place.light.unwrap_or(0));
+    let plain: Vec<Place> = plain.into_iter().filter(|place| nothing || !is_black(place)).collect();
+    let share = plain.len() as f64 / all.max(1) as f64;
+    let detail = format!("{} of {} of one brightness throughout", plain.len(), counted(all, "image"));
+    if plain.is_empty() {
+        return Check::done(CONTRAST, detail, 0.0, Vec::new());
+    }
+    let message = if nothing {
+        "no image shows anything: each is of one brightness throughout".to_owned()
+    } else {
+        format!(
+            "{} of one brightness throughout: {}",
+            counted(plain.len(), "image"),
+            names(&plain, statistics)
+        )
+    };
+    let values: Vec<(Place, f64)> = plain
+        .iter()
+        .map(|&place| (place, statistics.image(place.view.unwrap_or(0), place.light.unwrap_or(0)).mean))
+        .collect();
+    let finding = Finding {
+        code: if nothing { "no-contrast" } else { "plain-image" },
+        severity: if nothing { Severity::Fault } else { Severity::Suspicion },
+        confidence: 1.0,
+        message,
+        evidence: json!({"share": round(share, 5), "mean": listed(&values)}),
+        repair: None,
+        directions: plain,
+    };
+    Check::done(CONTRAST, detail, 1.0, vec![finding])
 }
 
 /// Looks for samples at the largest value.

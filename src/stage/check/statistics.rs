@@ -9,6 +9,7 @@ use crate::run::{Context, units};
 use crate::shape::Size;
 use crate::store::measurement::Description;
 use crate::views::{Views, linear, scaled};
+use crate::words::counted;
 use btfkit_formats::Direction;
 
 /// The window in the middle of the plane that is looked at texel by texel.
@@ -22,6 +23,9 @@ const TRIED_SIDE: usize = 32;
 
 /// Share of what the other images of the view or of the light promise below which an image is black.
 pub(super) const BLACK: f64 = 0.02;
+
+/// Difference of luminance, relative to the largest, up to which an image is plain: noise alone makes more.
+const PLAIN: f32 = 1e-3;
 
 /// Number of readings of the transfer curve: see [`Image::means`].
 pub const READINGS: usize = 3;
@@ -47,6 +51,8 @@ pub struct Image {
     pub largest: f32,
     /// How many samples have the value `largest`.
     pub at_largest: u64,
+    /// The least and the largest luminance of its texels; both are 0 where nothing is finite.
+    pub range: [f32; 2],
     /// Hash of all samples.
     pub hash: u64,
     /// Mean luminance of each cell of a lattice, row by row.
@@ -91,6 +97,12 @@ impl Statistics {
     pub fn clipped_share(&self, view: usize, light: usize) -> f64 {
         let image = self.image(view, light);
         if image.largest >= self.largest { image.at_largest as f64 / self.samples.max(1) as f64 } else { 0.0 }
+    }
+
+    /// Whether every texel of an image is as bright as the others. One texel alone is no image.
+    pub fn is_plain(&self, view: usize, light: usize) -> bool {
+        let [least, largest] = self.image(view, light).range;
+        self.size.texels() > 1 && largest - least <= PLAIN * largest.abs().max(least.abs())
     }
 
     /// Whether an image is so much darker than others of its view or of its light that nothing was photographed.
@@ -143,7 +155,12 @@ pub fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statistics> {
     let views: Vec<usize> = (0..description.views.len()).collect();
     let frontal = frontal_view(&description.views);
     context.progress.begin("check", views.len() as u64, Counted::Items("views"));
-    let in_flight = units::in_flight(context, 2 * description.view_bytes());
+    let what = format!(
+        "checking views of {} under {}",
+        description.size,
+        counted(description.lights.len(), "light")
+    );
+    let in_flight = units::in_flight(context, &what, 2 * description.view_bytes())?;
     let parts = units::for_each(context, &views, in_flight, |&view| {
         let part = of_view(source, view, view == frontal)?;
         context.progress.advance(1);
@@ -271,6 +288,7 @@ impl<'a> Sums<'a> {
         let image = Image {
             thumbnail: vec![0.0; cells.texels()],
             largest: f32::NEG_INFINITY,
+            range: [f32::INFINITY, f32::NEG_INFINITY],
             hash: 0xcbf2_9ce4_8422_2325,
             ..Image::default()
         };
@@ -293,6 +311,7 @@ impl<'a> Sums<'a> {
                 self.images.iter_mut().zip(stored.chunks_exact(channels)).zip(light)
             {
                 image.mean += f64::from(light);
+                image.range = [image.range[0].min(light), image.range[1].max(light)];
                 image.thumbnail[cell] += light;
                 sample.iter().for_each(|&s| image.add_sample(s));
                 if tried {

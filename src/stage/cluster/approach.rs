@@ -16,6 +16,7 @@ use crate::texel::cluster::lloyd::{self, Clustering, Method};
 use crate::texel::cluster::points::Points;
 use crate::texel::cluster::search::{Trial, Trials, more_clusters};
 use crate::texel::cluster::{seeding, total_distance};
+use crate::words::counted;
 
 impl Plan {
     /// Clusters all texels in memory.
@@ -64,9 +65,9 @@ impl Plan {
         context.progress.end();
         if let Some(last) = history.attempts.last().filter(|last| clustering.nearest.len() <= last.clusters) {
             return Err(Error::usage(format!(
-                "{} clusters, as many as a sample of {} texels gives, leave a mean |dL*| of {:.3}",
+                "{} clusters, as many as a sample of {} gives, leave a mean |dL*| of {:.3}",
                 last.clusters,
-                points.len(),
+                counted(points.len(), "texel"),
                 last.mean_lightness_error
             ))
             .hint("choose a larger --error or a larger --sample"));

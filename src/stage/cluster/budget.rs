@@ -1,11 +1,12 @@
 //! What memory allows: how many bounds a texel has and how many blocks are kept.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::run::Context;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, First, Plan};
 use crate::texel::cluster::seeding;
 use crate::texel::cluster::tally::Tally;
+use crate::words::counted;
 
 /// The program itself, and what allocators keep.
 const PROGRAM_BYTES: usize = 64 << 20;
@@ -71,15 +72,13 @@ impl Budget {
     pub(super) fn of(plan: &Plan, clusters: usize, context: &Context<'_>) -> Result<Self> {
         let needed = Self::least(plan, clusters, context.threads);
         let memory = usize::try_from(context.memory_bytes).unwrap_or(usize::MAX);
-        if needed > memory {
-            return Err(Error::usage(format!(
-                "clustering {} texels into {clusters} clusters takes {} MiB of memory at least, {} MiB are allowed",
-                plan.selection.texels(),
-                needed.div_ceil(1 << 20),
-                memory >> 20
-            ))
-            .hint("choose a larger --memory, fewer clusters, or --centre mean, which takes less"));
-        }
+        let what = format!(
+            "clustering {} into {}",
+            counted(plan.selection.texels(), "texel"),
+            counted(clusters, "cluster")
+        );
+        let otherwise = "choose fewer clusters (--clusters, --most), or --centre mean, which takes less";
+        context.memory().require(&what, needed as u64, otherwise)?;
         let [sample, all] = Needs::both(plan, clusters, context.threads);
         let columns = |needs: &Needs| {
             ((memory - needs.fixed) / (needs.texels * size_of::<u16>()).max(1)).clamp(1, clusters)

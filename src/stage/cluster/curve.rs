@@ -104,10 +104,7 @@ impl Plan {
     pub fn run(&self, context: &Context<'_>) -> Result<Curve> {
         let Self { clustering: plan, numbers } = self;
         let most = numbers.last().copied().unwrap_or(1);
-        let budget = Budget::of(plan, most, context).map_err(|error| match error.guidance() {
-            Some(_) => error.hint("choose a larger --memory or a smaller --most"),
-            None => error,
-        })?;
+        let budget = Budget::of(plan, most, context)?;
         let sample = plan.read_sample(context)?;
         let mut trials = Trials::new(&sample, plan.method(budget.sample_columns, None), plan.options.seed);
         context.progress.begin("draw centres", most as u64, Counted::Items("centres"));
@@ -173,7 +170,12 @@ impl Curve {
 
 /// A ratio for people: 1:7.3 or 1:1203.
 pub fn ratio_text(ratio: f64) -> String {
-    if ratio < 10.0 { format!("1:{ratio:.1}") } else { format!("1:{ratio:.0}") }
+    let decimals = match ratio {
+        _ if ratio < 0.1 => 3,
+        _ if ratio < 10.0 => 1,
+        _ => 0,
+    };
+    format!("1:{ratio:.decimals$}")
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ mod pass;
 mod stream;
 mod taken;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -21,6 +22,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
+use crate::names::with_ending;
 use crate::run::Context;
 use crate::stage::import::Shard;
 use crate::store::measurement::Measurement;
@@ -32,6 +34,7 @@ use crate::texel::cluster::points::Arrangement;
 use crate::texel::cluster::search::Trial;
 use crate::texel::cluster::selection::{Order, Selection};
 use crate::texel::tile::Tile;
+use crate::words::counted;
 pub use batches::First;
 use pass::{Next, Work};
 pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
@@ -209,15 +212,32 @@ fn measurement_of(model: &Model) -> Result<Option<String>> {
 /// Opens the measurement that a model was begun from.
 pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurement> {
     let measurement = Measurement::open(path)?;
-    let expected = measurement_of(model)?;
-    if expected.is_some_and(|expected| expected != measurement.digest()) {
-        return Err(Error::recipe(format!(
-            "{} was cut from another measurement than {}",
-            model.path().display(),
-            path.display()
-        )));
-    }
+    expect_measurement(model, &measurement)?;
     Ok(measurement)
+}
+
+/// Checks that a model was not begun from another measurement.
+///
+/// # Errors
+/// Says which measurement differs, and what to run.
+pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Result<()> {
+    const SHOWN: usize = 12;
+    let (expected, found) = (measurement_of(model)?, measurement.digest());
+    let Some(expected) = expected.filter(|expected| expected != found) else { return Ok(()) };
+    let [expected, found] = [expected.as_str(), found].map(|digest| digest.get(..SHOWN).unwrap_or(digest));
+    let (model, measurement) = (model.path().display(), measurement.path().display());
+    Err(Error::recipe(format!(
+        "{measurement} is not what {model} was made of: it was imported anew since in another way, or is another \
+         measurement (digest {expected}, now {found})"
+    ))
+    .hint(format!(
+        "name the measurement that it was made of, or make the model anew: btf model {measurement} {model} --force"
+    )))
+}
+
+/// The name that the measurement of a model has by default: `wood.zarr` of `wood.model.zarr`.
+pub(crate) fn measurement_name(model: &Path) -> OsString {
+    with_ending(model, &[".model.zarr", ".zarr"], ".zarr")
 }
 
 /// Checks options against the tile.
@@ -237,8 +257,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
         Amount::Clusters(clusters) if (1..=most).contains(&clusters) => clusters,
         Amount::Clusters(clusters) => {
             return Err(Error::usage(format!(
-                "{clusters} clusters were asked for, expected 1 to {most} for a tile of {} texels",
-                tile.size.texels()
+                "{clusters} clusters were asked for, expected 1 to {most} for a tile of {}",
+                counted(tile.size.texels(), "texel")
             )));
         }
         Amount::Error(error) if error > 0.0 => most.min(MOST_SEARCHED),
@@ -291,7 +311,7 @@ impl Plan {
     pub fn summary(&self) -> Value {
         json!({
             "stage": "cluster",
-            "model": self.options.model,
+            "model": self.options.model.display().to_string(),
             "texels": self.selection.texels(),
             "clusters_at_most": self.most_clusters,
             "sample_texels": self.sample_texels(),

@@ -47,7 +47,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
-        json!({"stage": "cluster", "model": self.model.path(), "clusters_of": self.from.path(), "recipe": self.recipe})
+        json!({"stage": "cluster", "model": self.model.path().display().to_string(),
+            "clusters_of": self.from.path().display().to_string(), "recipe": self.recipe})
     }
 
     /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.

@@ -112,6 +112,8 @@ pub struct Report {
     pub tiles_found: u64,
     /// Tiles written by this run.
     pub tiles_written: u64,
+    /// What tiles do not hold, a sentence each; of a run that found all of them nothing is known.
+    pub notes: Vec<String>,
 }
 
 /// Opens the source and checks that the place is free, or holds what the same recipe began.
@@ -154,7 +156,7 @@ impl Plan {
     pub fn summary(&self, context: &Context<'_>) -> Value {
         json!({
             "stage": "deepzoom",
-            "output": self.place.description,
+            "output": self.place.description.display().to_string(),
             "units": self.pyramid.tiles(),
             "unit": "tile",
             "levels": self.pyramid.top() + 1,
@@ -178,16 +180,7 @@ impl Plan {
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
-        let left = context.memory_bytes.saturating_sub(needed);
-        let (in_flight, bands) = self.scene.bands_in_flight(left).map_err(|_| {
-            Error::usage(format!(
-                "a pyramid {} pixels wide takes more than {} MiB of memory, {} MiB are allowed",
-                window.size.width,
-                needed >> 20,
-                context.memory_bytes >> 20
-            ))
-            .hint("allow a larger --memory, or make smaller tiles by --tile-size")
-        })?;
+        let (in_flight, bands) = self.scene.bands_in_flight("a pyramid", needed, context)?;
         self.place.begin(&self.recipe, context)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
@@ -199,6 +192,7 @@ impl Plan {
             read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
                 (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
+                    self.scene.beyond().count_pixels(self.scene.meaning(), &pixels);
                     cascade.push(&self.pyramid, &pixels, &tiles)
                 })
             })?;
@@ -216,6 +210,7 @@ impl Plan {
             levels: self.pyramid.top() + 1,
             tiles_found: found,
             tiles_written: total - found,
+            notes: self.scene.beyond().notes(),
         })
     }
 

@@ -32,8 +32,13 @@ impl Place {
     /// The place of a pyramid whose description is called `output`.
     pub(super) fn new(output: &Path, encoding: Encoding) -> Result<Self> {
         let ends = output.extension().is_some_and(|ending| ending == "dzi");
-        let name = output.file_stem().and_then(|name| name.to_str()).filter(|_| ends).ok_or_else(|| {
+        let name = output.file_stem().filter(|_| ends).ok_or_else(|| {
             Error::usage(format!("{}: expected a name that ends in .dzi", output.display()))
+        })?;
+        // Its page and its viewers name the folder of the tiles.
+        let name = name.to_str().ok_or_else(|| {
+            Error::usage(format!("{}: the name of a pyramid has to be valid UTF-8", output.display()))
+                .hint("choose another name")
         })?;
         Ok(Self {
             description: output.to_owned(),

@@ -74,7 +74,7 @@ impl Rule for Coherent {
     }
 
     fn advice(&self) -> &'static str {
-        "allow a larger --memory"
+        ""
     }
 
     fn make(&self, subject: &Subject, outputs: &[Output], context: &Context<'_>) -> Result<Vec<Units>> {

@@ -17,6 +17,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::error::{Error, Result};
+use crate::names::{ends_with, with_ending};
 use crate::run::Context;
 use crate::run::recipe::METHOD;
 use crate::shape::Size;
@@ -150,11 +151,8 @@ pub fn plan(options: &Options) -> Result<Plan> {
 
 /// `plane.zarr` with a number: `plane-3.zarr`.
 fn numbered(output: &Path, number: u64) -> PathBuf {
-    let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    match name.strip_suffix(".zarr") {
-        Some(stem) => output.with_file_name(format!("{stem}-{number}.zarr")),
-        None => output.with_file_name(format!("{name}-{number}")),
-    }
+    let ending = if ends_with(output, ".zarr") { ".zarr" } else { "" };
+    output.with_file_name(with_ending(output, &[ending], &format!("-{number}{ending}")))
 }
 
 impl Subject {
@@ -189,7 +187,7 @@ impl Plan {
         let (unit, units) = self.rule.units(&self.subject);
         json!({
             "stage": "enlarge",
-            "outputs": self.outputs.iter().map(|output| &output.path).collect::<Vec<_>>(),
+            "outputs": self.outputs.iter().map(|output| output.path.display().to_string()).collect::<Vec<_>>(),
             "units": units * self.outputs.len(),
             "unit": unit,
             "index_bytes": self.subject.index_bytes(),
@@ -201,15 +199,8 @@ impl Plan {
     /// Makes the outputs one after the other, each from where it was left.
     pub fn run(&self, context: &Context<'_>) -> Result<Vec<Report>> {
         let needed = self.rule.memory_bytes(&self.subject, context.threads);
-        if needed > context.memory_bytes {
-            return Err(Error::usage(format!(
-                "an enlargement {} texels wide takes {} MiB of memory, {} MiB are allowed",
-                self.subject.options.size.width,
-                needed.div_ceil(1 << 20),
-                context.memory_bytes >> 20
-            ))
-            .hint(self.rule.advice()));
-        }
+        let what = format!("an enlargement {} texels wide", self.subject.options.size.width);
+        context.memory().require(&what, needed, self.rule.advice())?;
         let units = self.rule.make(&self.subject, &self.outputs, context)?;
         let clusters = &self.subject.clusters;
         let texel_bytes = clusters.tile_bytes / self.subject.tile.texels() as u64;

@@ -187,7 +187,7 @@ impl Rule for Paper {
     }
 
     fn advice(&self) -> &'static str {
-        "choose a lower --band, a larger --memory or a smaller width, or leave out --keep-normals"
+        "choose a lower --band or a smaller width, or leave out --keep-normals"
     }
 
     fn make(&self, subject: &Subject, outputs: &[Output], context: &Context<'_>) -> Result<Vec<Units>> {

@@ -120,7 +120,7 @@ impl Rule for Patches {
     }
 
     fn advice(&self) -> &'static str {
-        "allow a larger --memory"
+        ""
     }
 
     fn make(&self, subject: &Subject, outputs: &[Output], context: &Context<'_>) -> Result<Vec<Units>> {

@@ -106,7 +106,7 @@ impl Rule for Quilting {
     }
 
     fn advice(&self) -> &'static str {
-        "choose a larger --memory or a smaller width, or leave out --keep-normals"
+        "choose a smaller width, or leave out --keep-normals"
     }
 
     fn make(&self, subject: &Subject, outputs: &[Output], context: &Context<'_>) -> Result<Vec<Units>> {

@@ -13,6 +13,7 @@ use crate::run::progress::{Counted, Stage};
 use crate::shape::Window;
 use crate::store::measurement::Measurement;
 use crate::store::output;
+use crate::words::counted;
 
 /// Memory that a band of rows may take while it is turned, bytes.
 const BAND_LIMIT_BYTES: usize = 256 << 20;
@@ -45,7 +46,7 @@ pub(super) fn dfmf(measurement: &Measurement, options: &Options, context: &Conte
         writer.finish()?;
         Ok(())
     })?;
-    Ok((made, description.obstacles_elsewhere(scalar, rank)))
+    Ok((made, notes(&description, scalar, rank, size)))
 }
 
 /// One factorisation of all channels.
@@ -64,7 +65,16 @@ pub(super) fn fmf(measurement: &Measurement, options: &Options, context: &Contex
         writer.finish()?;
         Ok(())
     })?;
-    Ok((made, description.obstacles_elsewhere(scalar, values.len())))
+    Ok((made, notes(&description, scalar, values.len(), size)))
+}
+
+/// What is not held, and what other programs will not like.
+fn notes(description: &bonn::Description, scalar: Scalar, rank: usize, size: Size) -> Vec<String> {
+    let mut notes = description.obstacles_elsewhere(scalar, rank);
+    if rank < size.full_rank() {
+        notes.push(format!("not held: all but {} of {}", counted(rank, "component"), size.full_rank()));
+    }
+    notes
 }
 
 /// Which channels a factorisation is of.

@@ -80,7 +80,11 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
         return Err(Error::missing(found).hint("finish its import first"));
     }
     let description = measurement.description();
-    let what = format!("exporting views of {} under {} lights", description.size, description.lights.len());
+    let what = format!(
+        "exporting views of {} under {}",
+        description.size,
+        counted(description.lights.len(), "light")
+    );
     context.require(&what, VIEW_COPIES * description.view_bytes())?;
     let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
@@ -97,6 +101,7 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
 
 #[cfg(feature = "hdf5")]
 use self::hdf5::write as hdf5;
+use crate::words::counted;
 
 #[cfg(not(feature = "hdf5"))]
 fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Written> {

@@ -16,19 +16,22 @@ pub(super) fn write(measurement: &Measurement, options: &Options, context: &Cont
     let (height, width) = (description.size.height, description.size.width);
     let shape = [description.views.len(), description.lights.len(), height, width, description.n_channels()];
     let failed = |error| Error::io("write", &options.output, error);
-    // Beside the array first: when the array is there, so are they.
-    for (kind, list) in [("views", &description.views), ("lights", &description.lights)] {
-        let beside = options.output.with_extension(format!("{kind}.npy"));
-        output::write_new(&beside, context.existing, &directions_file(list))?;
-    }
-    let beside = options.output.with_extension("channels.txt");
-    output::write_new(&beside, context.existing, &channels_file(&description.channels))?;
-    let made = output::write_whole(&options.output, context.existing, |output| {
+    // No name is taken before all files are ready; the array comes last: when it is there, so are the others.
+    let directions = [("views.npy", &description.views), ("lights.npy", &description.lights)];
+    let beside = directions.map(|(name, list)| (name, directions_file(list)));
+    let beside = beside.into_iter().chain([("channels.txt", channels_file(&description.channels))]);
+    let mut files = beside
+        .map(|(ending, bytes)| {
+            output::prepare_bytes(&options.output.with_extension(ending), context.existing, &bytes)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    files.push(output::prepare(&options.output, context.existing, |output| {
         output.write_all(&header(shape.map(|n| n as u64), description.sample_type)).map_err(failed)?;
         for_each_view(measurement, context, |_, images| {
             output.write_all(&sample_bytes(&images)).map_err(failed)
         })
-    })?;
+    })?);
+    let made = output::publish_all(files)?;
     let floats = matches!(description.sample_type.name(), "float16" | "float32");
     let native = if floats { Transfer::Linear } else { Transfer::Srgb };
     let mut warnings = Vec::new();

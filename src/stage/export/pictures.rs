@@ -13,6 +13,7 @@ use super::{Options, Written, for_each_view, linear};
 use crate::color::srgb_encode_u8;
 use crate::error::{Error, Result};
 use crate::run::Context;
+use crate::stage::loss::{self, Beyond, Takes};
 use crate::store::measurement::{Description, Measurement};
 use crate::store::output;
 
@@ -48,10 +49,13 @@ pub(super) fn ubo2003(
     let encoding = EncodeOptions { quality: options.quality, ..EncodeOptions::UBO2003 };
     let channels: u8 = if description.n_channels() == 1 { 1 } else { 3 };
     let (width, height) = (description.size.width as u32, description.size.height as u32);
+    let takes = Takes { bits: 8, names: false, mixes: true, linear: true };
+    let mut notes = loss::of_format(description, takes);
+    let beyond = Beyond::default();
     let made = output::write_whole(&options.output, context.existing, |output| {
         let mut zip = ZipWriter::new(output);
         for_each_view(measurement, context, |view, images| {
-            let display = display_codes(&images, description)?;
+            let display = display_codes(&images, description, &beyond)?;
             let image = display.len() / lights.len();
             let encoded: Vec<Vec<u8>> = context.install(|| {
                 let images = display.par_chunks_exact(image);
@@ -69,11 +73,12 @@ pub(super) fn ubo2003(
         zip.finish()?;
         Ok(())
     })?;
-    Ok((made, Vec::new()))
+    notes.extend(beyond.notes());
+    Ok((made, notes))
 }
 
-/// 8-bit sRGB values of samples: grey or R, G, B.
-fn display_codes(images: &Samples, description: &Description) -> Result<Vec<u8>> {
+/// 8-bit sRGB values of samples: grey or R, G, B. What they do not hold is counted.
+fn display_codes(images: &Samples, description: &Description, beyond: &Beyond) -> Result<Vec<u8>> {
     let plain = description.n_channels() == 1 || description.channels == ["R", "G", "B"];
     if let (Samples::U8(list), true, crate::color::Transfer::Srgb) = (images, plain, description.transfer) {
         return Ok(list.clone());
@@ -82,7 +87,10 @@ fn display_codes(images: &Samples, description: &Description) -> Result<Vec<u8>>
     let channels = description.n_channels();
     let kept = if channels == 1 { 1 } else { 3 };
     let pixels = (0..images.len()).step_by(channels);
-    Ok(pixels.flat_map(|at| decoder.rgb(images, at).into_iter().take(kept).map(srgb_encode_u8)).collect())
+    let values: Vec<f64> = pixels.flat_map(|at| decoder.rgb(images, at).into_iter().take(kept)).collect();
+    beyond.count_not_finite(loss::not_finite(images));
+    beyond.count(values.iter().copied());
+    Ok(values.into_iter().map(srgb_encode_u8).collect())
 }
 
 /// A folder of pictures, one folder a view, named by their angles in degrees: light fastest.
@@ -102,6 +110,12 @@ pub(super) fn folder(
         ))
         .hint("export to a folder of EXRs instead"));
     }
+    let notes = match kind {
+        Kind::Exr => Vec::new(),
+        Kind::Png => {
+            loss::of_format(description, Takes { bits: 16, names: false, mixes: false, linear: false })
+        }
+    };
     let made = output::write_whole_folder(&options.output, context.existing, |root| {
         for_each_view(measurement, context, |view, images| {
             let image = images.len() / description.lights.len();
@@ -115,7 +129,7 @@ pub(super) fn folder(
             })
         })
     })?;
-    Ok((made, Vec::new()))
+    Ok((made, notes))
 }
 
 fn picture_bytes(samples: Samples, description: &Description, kind: Kind) -> Result<Vec<u8>> {

@@ -7,17 +7,18 @@ use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
 use crate::error::{Error, Result};
-use crate::picture::{Encoding, Picture, stream};
+use crate::picture::{Encoding, Ending, Picture, stream};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
+use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
 use crate::store::output::Made;
 use crate::texel::evaluate::{Appearance, add};
 use crate::texel::tile::Tile;
 use crate::texel::triangulation::{Interpolator, triangulate};
-use btfkit_formats::Direction;
+use btfkit_formats::{Direction, Samples};
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
 pub(crate) use scene::{model_of, of_stage, plane_rows};
@@ -77,8 +78,18 @@ pub struct PlaneOptions {
     pub jitter: Option<u32>,
 }
 
-/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only. Returns its size, and whether
-/// it was there already.
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Rows and columns.
+    pub size: Size,
+    /// Whether it was there already.
+    pub made: Made,
+    /// What the format does not hold, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Writes the picture: PNG and EXR row by row, in memory that grows with its width only.
 ///
 /// # Errors
 /// A window that does not lie within the plane, a size that the format or the memory does not hold, and those of
@@ -89,10 +100,10 @@ pub fn run(
     output: &Path,
     encoding: Encoding,
     context: &Context<'_>,
-) -> Result<(Size, Made)> {
+) -> Result<Report> {
     let fits = |size: Size| {
         encoding.check_size(size)?;
-        encoding.check_memory(size, WRITING_BYTES, context.memory_bytes)
+        encoding.check_memory(size, WRITING_BYTES, context.memory())
     };
     options.window.map_or(Ok(()), |window| fits(window.size))?;
     let mut scene = Scene::open(options, context)?;
@@ -100,19 +111,22 @@ pub fn run(
     let size = scene.size();
     fits(size)?;
     let writing = encoding.memory_bytes(size) + WRITING_BYTES;
-    let (in_flight, bands) = scene.bands_in_flight(context.memory_bytes.saturating_sub(writing))?;
+    let (in_flight, bands) = scene.bands_in_flight("a picture", writing, context)?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
         stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
+            if encoding.ending != Ending::Exr {
+                scene.beyond().count_pixels(scene.meaning(), pixels);
+            }
             context.progress.advance(1);
             Ok(())
         })
     })?;
     context.progress.end();
-    Ok((size, made))
+    Ok(Report { size, made, notes: scene.beyond().notes() })
 }
 
 /// The rows of a picture, out of bands.
@@ -151,7 +165,8 @@ pub fn of_measurement(
 ) -> Result<Picture> {
     let appearance = measured_appearance(measurement, view, light);
     let decoder = measurement.description().decoder()?;
-    Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, context)?))
+    let beyond = Beyond::default();
+    Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, &beyond, context)?))
 }
 
 /// How a measurement is mixed under a light, seen from a view.
@@ -167,6 +182,7 @@ fn mixed(
     appearance: &Appearance,
     decoder: &Decoder,
     window: Window,
+    beyond: &Beyond,
     context: &Context<'_>,
 ) -> Result<Vec<[f32; 3]>> {
     let description = measurement.description();
@@ -181,11 +197,19 @@ fn mixed(
             let band = Window { y: window.y + top, x: window.x, size: Size::new(rows, window.size.width) };
             let samples = measurement.read_reflectance(view, band)?;
             let to = &mut pixels[top * window.size.width..];
+            let floats = matches!(samples, Samples::F16(_) | Samples::F32(_));
+            let mut not_finite = 0;
             for (at, sum) in (0..samples.len()).step_by(texel).zip(to) {
                 for &(_, light, weight) in appearance.terms.iter().filter(|(v, ..)| *v == view) {
+                    if floats {
+                        let first = at + light * channels;
+                        let finite = |channel| samples.value(channel).is_some_and(f64::is_finite);
+                        not_finite += (first..first + channels).filter(|&channel| !finite(channel)).count();
+                    }
                     add(sum, weight, decoder.rgb(&samples, at + light * channels));
                 }
             }
+            beyond.count_not_finite(not_finite as u64);
         }
     }
     Ok(pixels.into_iter().map(|p| p.map(|value| value as f32)).collect())

@@ -17,12 +17,14 @@ use crate::kernel::Kernel;
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
-use crate::stage::cluster::open_measurement_of;
+use crate::stage::cluster::{measurement_name, open_measurement_of};
+use crate::stage::loss::Beyond;
 use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
-use crate::store::model_place;
+use crate::store::origin;
+use crate::words::counted;
 
 /// Rows of a measurement that are decoded together: a row of chunks.
 pub(super) const MEASUREMENT_ROWS: usize = 16;
@@ -40,6 +42,7 @@ pub struct Scene {
     area: Area,
     /// What tells its pixels apart from those of another source.
     recipe: Value,
+    beyond: Beyond,
 }
 
 enum Source {
@@ -150,12 +153,17 @@ impl Scene {
         if options.values != Values::Model {
             recipe["values"] = json!("measured");
         }
-        Ok(Self { source, area, recipe })
+        Ok(Self { source, area, recipe, beyond: Beyond::default() })
     }
 
     /// Rows and columns.
     pub fn size(&self) -> Size {
         self.area.size
+    }
+
+    /// What of it display values do not hold, as far as it has been read; whoever encodes rows counts them here too.
+    pub fn beyond(&self) -> &Beyond {
+        &self.beyond
     }
 
     /// What its values mean.
@@ -203,7 +211,7 @@ impl Scene {
         let window = area.within_first_quadrant().ok_or_else(|| Error::internal("a window below 0"))?;
         let pixels = match &self.source {
             Source::Measurement { measurement, appearance, decoder } => {
-                Pixels::Own(mixed(measurement, appearance, decoder, window, context)?)
+                Pixels::Own(mixed(measurement, appearance, decoder, window, &self.beyond, context)?)
             }
             Source::Tile(picture) => Pixels::Own(picture.part(window).pixels),
             Source::Clusters { enlarged, colors } => {
@@ -233,27 +241,25 @@ impl Scene {
         Ok(Band { width, pixels })
     }
 
-    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where `allowed_bytes` do not
-    /// hold more, and how many of them fit at a time.
+    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where memory does not hold more
+    /// beside so many bytes, and how many of them fit at a time. `what` has these rows.
     ///
     /// # Errors
     /// Where not even a row fits.
     pub fn bands_in_flight(
         &self,
-        allowed_bytes: u64,
+        what: &str,
+        beside: u64,
+        context: &Context<'_>,
     ) -> Result<(usize, impl Iterator<Item = Range<usize>> + Send + use<>)> {
         let Size { height, width } = self.area.size;
         let row_bytes = (width * self.texel_bytes()) as u64;
         let sizes = std::iter::successors(Some(self.chunk_rows()), |&rows| (rows > 1).then_some(rows / 2));
+        let what = format!("{what} {} wide", counted(width, "pixel"));
+        context.memory().require(&what, beside + row_bytes, "show a narrower part by --window")?;
+        let allowed_bytes = context.memory_bytes.saturating_sub(beside);
         let fitting = sizes.into_iter().find(|&rows| rows as u64 * row_bytes <= allowed_bytes);
-        let rows = fitting.ok_or_else(|| {
-            Error::usage(format!(
-                "a row of {width} pixels takes {} KiB of memory, {} KiB are left for it",
-                row_bytes.div_ceil(1024),
-                allowed_bytes / 1024
-            ))
-            .hint("allow a larger --memory, or picture a narrower part")
-        })?;
+        let rows = fitting.ok_or_else(|| Error::internal("memory for no row"))?;
         let in_flight = read_ahead::in_flight(allowed_bytes, rows as u64 * row_bytes);
         // Rows of chunks begin at row 0 of what is stored.
         let before = self.area.y.rem_euclid(rows as i64) as usize;
@@ -333,13 +339,7 @@ fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Resu
             look_up(tile.size, &of_stage(model, Stage::Cluster, Model::index)?, &colors)
         }
         (Subject::Appearance { view, light }, Values::Measured(path)) => {
-            let place = path.clone().unwrap_or_else(|| measurement_beside(model.path()));
-            let measurement = open_measurement_of(model, &place).map_err(|error| {
-                error.hint(match path {
-                    None => "name the measurement with --measurement",
-                    Some(_) => "--measurement names the measurement that the model was made of",
-                })
-            })?;
+            let measurement = measurement_of(model, path.as_deref())?;
             of_measured_tile(&measurement, &tile, view, light, context)
         }
         (Subject::Index, _) => {
@@ -351,11 +351,43 @@ fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Resu
     }
 }
 
-/// Where `btf model` finds the measurement by default: `wood.zarr` beside `wood.model.zarr`.
-fn measurement_beside(model: &Path) -> PathBuf {
-    let model: PathBuf = model.components().collect();
-    let name = model.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    model.with_file_name(format!("{}.zarr", name.strip_suffix(".model.zarr").unwrap_or(&name)))
+/// The measurement that a model was made of; where it is not named, it is looked for where it lay then as seen from the
+/// model, beside the model, and in the current folder.
+fn measurement_of(model: &Model, named: Option<&Path>) -> Result<Measurement> {
+    if let Some(path) = named {
+        return open_measurement_of(model, path);
+    }
+    let name = measurement_name(model.path());
+    let places = origin::places(model.path(), origin::MEASUREMENT, name.to_str());
+    let error = match found_at(&places, |path| open_measurement_of(model, path)) {
+        Ok(measurement) => return Ok(measurement),
+        Err(Some(error)) => return Err(error),
+        Err(None) => Error::missing(format!(
+            "{}: the measurement that it was made of is not there; looked for {}",
+            model.path().display(),
+            listed(&places)
+        )),
+    };
+    Err(error.hint("name the measurement with --measurement"))
+}
+
+/// What is opened at the first of some places that can be; else the first error, if there is anything at any of them.
+fn found_at<T>(
+    places: &[PathBuf],
+    open: impl Fn(&Path) -> Result<T>,
+) -> std::result::Result<T, Option<Error>> {
+    let mut failed = None;
+    for path in places.iter().filter(|path| path.exists()) {
+        match open(path) {
+            Ok(found) => return Ok(found),
+            Err(error) => drop(failed.get_or_insert(error)),
+        }
+    }
+    Err(failed)
+}
+
+fn listed(places: &[PathBuf]) -> String {
+    places.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" and ")
 }
 
 fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Context<'_>) -> Result<Scene> {
@@ -377,7 +409,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         "window": [area.x, area.y, area.size.width, area.size.height],
         "values": if options.values == Values::Model { "model" } else { "measured" },
     });
-    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe })
+    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe, beyond: Beyond::default() })
 }
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {
@@ -431,22 +463,17 @@ pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) 
     if let Some(path) = named {
         return open(path).map_err(|error| error.hint("--model names the model that it was enlarged from"));
     }
-    let places = model_place::places(place, enlarged.model_name());
-    let mut failed = None;
-    for path in places.iter().filter(|path| path.exists()) {
-        match open(path) {
-            Ok(model) => return Ok(model),
-            Err(error) => drop(failed.get_or_insert(error)),
-        }
-    }
-    let error = failed.unwrap_or_else(|| {
-        let looked: Vec<String> = places.iter().map(|path| path.display().to_string()).collect();
-        Error::missing(format!(
-            "{}: the model that it was enlarged from is not there; looked for {}",
-            place.display(),
-            looked.join(" and ")
-        ))
-    });
+    let places = origin::places(place, origin::MODEL, enlarged.model_name());
+    let error = match found_at(&places, open) {
+        Ok(model) => return Ok(model),
+        Err(failed) => failed.unwrap_or_else(|| {
+            Error::missing(format!(
+                "{}: the model that it was enlarged from is not there; looked for {}",
+                place.display(),
+                listed(&places)
+            ))
+        }),
+    };
     Err(error.hint("name the model with --model"))
 }
 

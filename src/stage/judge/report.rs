@@ -8,15 +8,18 @@ use serde::{Deserialize, Serialize};
 use super::crops::Origin;
 use crate::likeness::verdict::Verdict;
 use crate::likeness::{Judgement, Measure};
+use crate::names::serialize_path;
 
 /// What a judging found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// What was judged.
+    #[serde(serialize_with = "serialize_path")]
     pub subject: PathBuf,
     /// Its rows and columns.
     pub size: [usize; 2],
     /// The measurement that it was judged by.
+    #[serde(serialize_with = "serialize_path")]
     pub measurement: PathBuf,
     /// The digest of that measurement.
     pub measurement_digest: String,

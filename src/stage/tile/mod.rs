@@ -15,8 +15,11 @@ use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wa
 use crate::run::Context;
 use crate::run::recipe::METHOD;
 use crate::shape::Size;
+use crate::stage::cluster::{expect_measurement, measurement_name};
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
+use crate::store::origin;
+use crate::store::output::Existing;
 pub use crate::store::tile_report::TileReport as Report;
 use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use features::lattice_of;
@@ -98,7 +101,7 @@ fn range(choice: Choice, plane: Size, lattice: &Lattice, joins: bool) -> Result<
 impl Plan {
     /// What would be done.
     pub fn summary(&self) -> Value {
-        json!({"stage": "tile", "model": self.model, "recipe": self.recipe})
+        json!({"stage": "tile", "model": self.model.display().to_string(), "recipe": self.recipe})
     }
 
     /// Whether a run would find it done. What a run would refuse, or make anew by force, is not done.
@@ -109,7 +112,13 @@ impl Plan {
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let model = Model::create(&self.model, context)?;
-        let Some(_lock) = model.begin(Stage::Tile, &self.recipe, context)? else {
+        if context.existing == Existing::Keep {
+            expect_measurement(&model, &self.measurement)?;
+        }
+        let begun = model.begin(Stage::Tile, &self.recipe, context)?;
+        let name = measurement_name(&self.model);
+        origin::note(&self.model, origin::MEASUREMENT, self.measurement.path(), name.to_str())?;
+        let Some(_lock) = begun else {
             return model.report(Stage::Tile);
         };
         let description = self.measurement.description();

@@ -43,7 +43,7 @@ pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> R
         });
     }
     context.progress.begin("verify", found.len() as u64, Counted::Items("shards"));
-    let in_flight = units::in_flight(context, SHARD_BYTES);
+    let in_flight = units::in_flight(context, "verifying a shard", SHARD_BYTES)?;
     let findings = units::for_each(context, &found, in_flight, |&place| {
         let mut findings = Vec::new();
         of_shard(&enlarged, window(place, enlarged.size()), tile.as_ref(), &mut findings)?;

@@ -14,6 +14,7 @@ use crate::shape::Window;
 use crate::store::gather::{self, Images};
 use crate::store::measurement::{Measurement, SampleArray};
 use crate::store::metadata::OLDEST_FORMAT;
+use crate::words::counted;
 
 /// What was found.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -68,7 +69,12 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
         .partition(|&view| measurement.has_view(view) || measurement.obstructed(view));
     context.progress.begin("verify", found.len() as u64, Counted::Items("views"));
     let copies = if source.is_some() { 4 } else { 2 };
-    let in_flight = units::in_flight(context, copies * description.view_bytes());
+    let what = format!(
+        "verifying views of {} under {}",
+        description.size,
+        counted(description.lights.len(), "light")
+    );
+    let in_flight = units::in_flight(context, &what, copies * description.view_bytes())?;
     let different = AtomicU64::new(0);
     let views = units::for_each(context, &found, in_flight, |&view| {
         let (damaged, remarkable) = verify_view(measurement, view)?;

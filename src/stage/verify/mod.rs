@@ -81,6 +81,7 @@ pub struct Beside<'a> {
 /// Where nothing that can be verified lies there, or its attributes are damaged so far that nothing can be looked at; and
 /// those of the operating system. What else is damaged is reported.
 pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Found> {
+    recognise::expect_readable(path)?;
     let found = if is_pyramid(path) {
         Found::Other(deepzoom::verify(path, context)?)
     } else {

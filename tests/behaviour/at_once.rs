@@ -1,0 +1,162 @@
+//! Two processes that make the same output at the same time.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::fixture::{btf, fixture, succeed, tree};
+
+/// Starts two commands at once; their exit codes and what they said.
+fn both(commands: [&mut Command; 2]) -> [(Option<i32>, String); 2] {
+    let started = commands.map(|command| {
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    });
+    started.map(|child| {
+        let output = child.wait_with_output().unwrap();
+        let told = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+        (output.status.code(), told.concat())
+    })
+}
+
+/// What lies in a folder, however it got there; no temporary name among it.
+fn made(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let files = tree(folder);
+    assert!(files.keys().all(|name| !name.to_string_lossy().contains(".tmp-")), "{:?}", files.keys());
+    files
+}
+
+/// The arguments that make a variant of an output.
+type Arguments = fn(usize) -> Vec<String>;
+
+/// Outputs and the arguments that make them; `variant` 0 and 1 make different ones.
+fn outputs() -> Vec<(&'static str, Arguments)> {
+    fn words(text: &str) -> Vec<String> {
+        text.split(' ').map(str::to_owned).collect()
+    }
+    fn measurement() -> String {
+        fixture().measurement().display().to_string()
+    }
+    let mut list: Vec<(&'static str, Arguments)> = vec![
+        ("s.zip", |variant| words(&format!("sample OUT --size 16x16 --views 2 --lights 3 --seed {variant}"))),
+        ("e.zip", |variant| words(&format!("export {} OUT --quality {}", measurement(), 90 + variant))),
+        ("e.btf", |variant| words(&format!("export {} OUT --rank {}", measurement(), 1 + variant))),
+        ("e", |variant| words(&format!("export {} OUT --to {}", measurement(), ["png", "exr"][variant]))),
+        ("i.png", |variant| words(&format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
+        ("i.exr", |variant| words(&format!("image {} --out OUT --light {},0", measurement(), 15 + variant))),
+    ];
+    if cfg!(feature = "hdf5") {
+        list.push(("e.h5", |_| words(&format!("export {} OUT", measurement()))));
+    }
+    list.push(("e.npy", |_| words(&format!("export {} OUT", measurement()))));
+    list
+}
+
+fn command(arguments: &[String], output: &Path) -> Command {
+    let mut command = btf();
+    for argument in arguments {
+        match argument.as_str() {
+            "OUT" => command.arg(output),
+            argument => command.arg(argument),
+        };
+    }
+    command
+}
+
+/// What each variant makes alone.
+fn alone(name: &str, arguments: Arguments, variant: usize) -> BTreeMap<PathBuf, Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(&mut command(&arguments(variant), &folder.path().join(name)));
+    made(folder.path())
+}
+
+#[test]
+fn of_two_that_make_the_same_one_writes_it_and_the_other_finds_it_done() {
+    for (name, arguments) in outputs() {
+        let expected = alone(name, arguments, 0);
+        for force in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let output = folder.path().join(name);
+            let [mut a, mut b] = [(); 2].map(|()| command(&arguments(0), &output));
+            if force {
+                a.arg("--force");
+                b.arg("--force");
+            }
+            for (code, told) in both([&mut a, &mut b]) {
+                assert_eq!(code, Some(0), "{name}: {told}");
+            }
+            assert!(made(folder.path()) == expected, "{name}, force {force}: another content");
+        }
+    }
+}
+
+#[test]
+fn of_two_that_make_different_ones_the_second_is_told_and_nothing_is_mixed() {
+    for (name, arguments) in outputs() {
+        if arguments(0) == arguments(1) {
+            continue;
+        }
+        let expected = [0, 1].map(|variant| alone(name, arguments, variant));
+        for force in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let output = folder.path().join(name);
+            let [mut a, mut b] = [0, 1].map(|variant| command(&arguments(variant), &output));
+            if force {
+                a.arg("--force");
+                b.arg("--force");
+            }
+            let ended = both([&mut a, &mut b]);
+            let found = made(folder.path());
+            assert!(expected.contains(&found), "{name}, force {force}: mixed");
+            for (variant, (code, told)) in ended.iter().enumerate() {
+                // A folder that holds other files is never replaced.
+                if found == expected[variant] || force && name != "e" {
+                    assert_eq!(*code, Some(0), "{name}: {told}");
+                } else {
+                    assert_eq!(*code, Some(65), "{name}: {told}");
+                    assert!(
+                        told.contains("exists and holds something else")
+                            || told.contains("meanwhile")
+                            || told.contains("holds other files"),
+                        "{told}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_name_is_taken_before_all_are_known_to_be_free() {
+    let folder = tempfile::tempdir().unwrap();
+    let measurement = fixture().measurement();
+    for taken in ["e.npy", "e.views.npy", "e.lights.npy", "e.channels.txt"] {
+        for (force, file) in [(false, false), (false, true), (true, false)] {
+            let at = folder.path().join(format!("{taken}-{force}-{file}"));
+            let name = at.join(taken);
+            std::fs::create_dir(&at).unwrap();
+            if file {
+                std::fs::write(&name, "x").unwrap();
+            } else {
+                std::fs::create_dir(&name).unwrap();
+            }
+            let mut export = btf();
+            export.arg("export").arg(&measurement).arg(at.join("e.npy"));
+            if force {
+                export.arg("--force");
+            }
+            let told = crate::fixture::fail(&mut export, 65);
+            assert!(told.contains(taken), "{told}");
+            let names: Vec<_> =
+                std::fs::read_dir(&at).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            assert_eq!(names, [taken], "{told}");
+        }
+    }
+    // The report of a field is two files.
+    let model = fixture().model();
+    let copied = folder.path().join("m.model.zarr");
+    crate::fixture::copy(&model, &copied);
+    std::fs::create_dir(folder.path().join("r.png")).unwrap();
+    let told =
+        crate::fixture::fail(btf().arg("fit").arg(&copied).arg("--report").arg(folder.path().join("r")), 65);
+    assert!(told.contains("r.png") && !folder.path().join("r.txt").exists(), "{told}");
+}

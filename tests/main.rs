@@ -19,6 +19,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/crafted_stores.rs"]
+mod crafted_stores;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/damaged_stores.rs"]

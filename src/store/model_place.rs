@@ -32,16 +32,14 @@ pub(crate) fn note(index: &Path, model: &Path) -> Result<()> {
 
 /// Where the model of an index may lie, the likeliest first; `name` is the one it had.
 pub(crate) fn places(index: &Path, name: Option<&str>) -> Vec<PathBuf> {
-    // A trailing slash would make the index its own folder.
-    let given: PathBuf = index.components().collect();
     // Through links to the index itself: the way leads from where it lies.
-    let real = given.canonicalize().unwrap_or_else(|_| given.clone());
+    let real = index.canonicalize().unwrap_or_else(|_| index.to_owned());
     let mut places = Vec::new();
     if let (Some(way), Some(folder)) = (read(index), real.parent()) {
         places.push(folder.join(way));
     }
     let name = name.filter(|name| Path::new(name).file_name().is_some_and(|file| file == *name));
-    for index in [given, real] {
+    for index in [index, &real] {
         if let Some(beside) = name.map(|name| index.with_file_name(name))
             && !places.contains(&beside)
         {
@@ -102,6 +100,14 @@ mod tests {
         let found = places(&index, Some("a.model.zarr"));
         assert_eq!(found[0].canonicalize().unwrap(), model);
         assert_eq!(found[1..], std::slice::from_ref(&beside)[..]);
+        let slashed = PathBuf::from(format!("{}/", index.display()));
+        assert_eq!(places(&slashed, Some("a.model.zarr")), found);
+        // Through a link the way leads from where the index lies.
+        let link = root.join("link.zarr");
+        std::os::unix::fs::symlink(&index, &link).unwrap();
+        let found = places(&link, Some("a.model.zarr"));
+        assert_eq!(found[0].canonicalize().unwrap(), model);
+        assert_eq!(found[1..], [root.join("a.model.zarr"), beside.clone()]);
         // Noted again from beside it, nothing is left to note.
         note(&index, &beside).unwrap();
         assert!(!index.join(FILE).exists());
@@ -120,6 +126,10 @@ mod tests {
         assert_eq!(places(&index, Some("../up")), [] as [PathBuf; 0]);
         fs::remove_file(index.join(FILE)).unwrap();
         fs::create_dir(index.join(FILE)).unwrap();
+        assert_eq!(places(&index, None), [] as [PathBuf; 0]);
+        fs::remove_dir(index.join(FILE)).unwrap();
+        // Reading a pipe would wait for a writer.
+        assert!(std::process::Command::new("mkfifo").arg(index.join(FILE)).status().unwrap().success());
         assert_eq!(places(&index, None), [] as [PathBuf; 0]);
     }
 }

@@ -8,11 +8,12 @@ use btfkit::run::Context;
 use btfkit::shape::{Size, Window};
 use btfkit::stage::verify::{self, Beside, Found};
 use btfkit::store::enlarged::{Description, Enlarged, Texels};
+use btfkit::store::metadata::seal;
 use btfkit::store::model::{Model, Stage};
 use serde_json::{Value, json};
 
 use crate::coherent_damage::change;
-use crate::damaged_stores::{Copy, with_context};
+use crate::damaged_stores::{Copy, seal_again, with_context};
 use crate::fixture::tree_names;
 
 /// What `verify` says of a store: its findings, or the error that keeps it from looking.
@@ -215,4 +216,106 @@ fn what_no_enlargement_has_is_found_behind_right_checksums_and_seals() {
     change(&file, "/attributes/btfkit/checksums", None);
     let told = with_context(|context| told(&store, context));
     assert!(told.contains("was not declared finished"), "{told}");
+}
+
+/// Changes a member of our attributes, with a seal that is right again but digests as they are told.
+fn change_and_seal(file: &Path, pointer: &str, value: Value) {
+    let mut document: Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+    *document.pointer_mut(pointer).unwrap() = value;
+    let ours = document.pointer_mut("/attributes/btfkit").unwrap();
+    ours["seal"] = json!(seal(ours.as_object().unwrap()));
+    std::fs::write(file, document.to_string()).unwrap();
+}
+
+#[test]
+fn arrays_and_entries_of_another_model_are_found() {
+    let copy = Copy::new();
+    let model = copy.place("m.zarr");
+    let file = model.join("zarr.json");
+    let whole = std::fs::read(&file).unwrap();
+    let stages = "/attributes/btfkit/stages";
+    let found = |words: &str| {
+        let told = with_context(|context| told(&model, context));
+        assert!(told.contains(words), "{words}: {told}");
+        std::fs::write(&file, &whole).unwrap();
+    };
+    change_and_seal(&file, &format!("{stages}/cluster/digest"), json!("0"));
+    found("cluster: digest: it is not that of the recipe");
+    change(&file, &format!("{stages}/cluster/checksums"), None);
+    found("cluster: no checksums");
+    let entry = json!({"recipe": {}, "digest": "", "report": {}, "checksums": {}});
+    change(&file, &format!("{stages}/more"), Some(entry));
+    found("no stage is called \"more\"");
+    // Numbers that a model may have, but not this one.
+    let half = 0.5f64.to_le_bytes();
+    let patches: [(&str, &[u8]); 4] =
+        [("mrf/mean", &half), ("mrf/gain", &half), ("appearance/features", &[77]), ("centres", &[1])];
+    for (array, bytes) in patches {
+        let copy = Copy::new();
+        let model = copy.place("m.zarr");
+        patch(&model, array, &[(0, bytes)]);
+        let told = with_context(|context| told(&model, context));
+        assert!(told.contains(&format!("{array}/c/0")) && told.contains("its checksum is not"), "{told}");
+    }
+}
+
+#[test]
+fn what_other_programs_read_is_what_the_store_says() {
+    let copy = Copy::new();
+    for (name, array) in [("s.zarr", "view_theta"), ("m.zarr", "mrf/mean"), ("coherent.zarr", "source")] {
+        let place = format!("/consolidated_metadata/metadata/{}", array.replace('/', "~1"));
+        let file = copy.place(name).join("zarr.json");
+        let whole = std::fs::read(&file).unwrap();
+        let mut document: Value = serde_json::from_slice(&whole).unwrap();
+        document.pointer_mut(&place).unwrap()["shape"] = json!([1]);
+        std::fs::write(&file, document.to_string()).unwrap();
+        let told = with_context(|context| told(&copy.place(name), context));
+        assert!(told.contains("the copy of all metadata"), "{name}: {told}");
+        std::fs::write(&file, whole).unwrap();
+    }
+    let store = copy.place("s.zarr");
+    let file = store.join("zarr.json");
+    let whole = std::fs::read(&file).unwrap();
+    change(&file, "/attributes/btfkit/checksums", None);
+    let found = with_context(|context| told(&store, context));
+    assert!(found.contains("was not declared finished"), "{found}");
+    std::fs::write(&file, whole).unwrap();
+    patch(&store, "view_theta", &[(0, &77.0f64.to_le_bytes())]);
+    let found = with_context(|context| told(&store, context));
+    assert!(found.contains("view_theta: not the angles of view_direction"), "{found}");
+}
+
+#[test]
+fn what_no_pyramid_has_is_found_behind_right_seals() {
+    let copy = Copy::new();
+    let tiles = copy.place("p_files");
+    let file = tiles.join("btfkit.json");
+    let whole = std::fs::read(&file).unwrap();
+    for (place, value, words) in [
+        ("/recipe/source/window", json!([0, 0, 0, 32]), "sizes that no pyramid has"),
+        ("/recipe/source/window", json!([0, 0, 40, 1u64 << 40]), "sizes that no pyramid has"),
+        ("/recipe/tile_side", json!(1 << 20), "sizes that no pyramid has"),
+        ("/recipe/overlap", json!(9), "sizes that no pyramid has"),
+        ("/recipe/overlap", json!(2), "not the text that follows from the recipe"),
+        ("/checksums", json!(null), "is not the one that was kept"),
+    ] {
+        let mut state: Value = serde_json::from_slice(&whole).unwrap();
+        let (parent, name) = place.rsplit_once('/').unwrap();
+        state.pointer_mut(parent).unwrap()[name] = value.clone();
+        seal_again(state.as_object_mut().unwrap());
+        std::fs::write(&file, state.to_string()).unwrap();
+        let found = with_context(|context| told(&tiles, context));
+        assert!(found.contains(words), "{place} {value}: {found}");
+        std::fs::write(&file, &whole).unwrap();
+    }
+    let mut state: Value = serde_json::from_slice(&whole).unwrap();
+    state.as_object_mut().unwrap().remove("checksums");
+    seal_again(state.as_object_mut().unwrap());
+    std::fs::write(&file, state.to_string()).unwrap();
+    let found = with_context(|context| told(&tiles, context));
+    assert!(found.contains("none are kept"), "{found}");
+    std::fs::write(&file, &whole).unwrap();
+    std::fs::copy(tiles.join("0/0_0.png"), tiles.join("1/0_0.png")).unwrap();
+    let found = with_context(|context| told(&tiles, context));
+    assert!(found.contains("got a tile of 1x1, expected 2x1"), "{found}");
 }

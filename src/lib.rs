@@ -10,6 +10,7 @@
 //! [`stage`] holds one module a step, [`store`] what lies on disk, [`run`] what makes long work
 //! survive, [`texel`], [`mrf`], [`likeness`] and [`color`] the science, [`baseline`] what it is
 //! measured by, [`kernel`] the hot loops.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod archive;
 pub mod baseline;

@@ -57,6 +57,8 @@ mod paper_bytes;
 mod picture_formats;
 #[path = "behaviour/pictures.rs"]
 mod pictures;
+#[path = "behaviour/readme.rs"]
+mod readme;
 #[path = "behaviour/real_data.rs"]
 mod real_data;
 #[path = "behaviour/recipes.rs"]

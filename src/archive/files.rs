@@ -10,7 +10,7 @@ use btfkit_formats::picture;
 use btfkit_formats::zip::ZipIndex;
 
 use crate::error::{Error, Result};
-use crate::store::mapped::MappedFile;
+use crate::store::mapped::{self, MappedFile};
 
 /// Folders below the archive's own that are looked into.
 const FOLDER_DEPTH: usize = 8;
@@ -235,13 +235,12 @@ fn is_hidden(name: &str) -> bool {
 /// # Errors
 /// Says that it is none.
 pub(super) fn regular(path: &Path) -> Result<fs::File> {
-    let data = fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
-    if !data.is_file() {
-        let what = if data.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
-        return Err(Error::input(format!("{}: got {what}, expected a file", path.display()))
-            .hint("copy its contents into a file"));
-    }
-    fs::File::open(path).map_err(|error| Error::io("read", path, error))
+    mapped::open(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::InvalidInput => {
+            Error::input(format!("{}: {error}", path.display())).hint("copy its contents into a file")
+        }
+        _ => Error::io("read", path, error),
+    })
 }
 
 /// Whether a file is a zip by its first bytes (an empty zip begins with its end record).

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::run::recipe;
-use crate::store::mapped::write_file;
+use crate::store::mapped::{MappedFile, write_file};
 
 /// A step and the time that it took.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,12 +34,12 @@ impl Times {
     /// # Errors
     /// [`crate::Kind::Recipe`] where the folder holds another demo.
     pub(super) fn open(path: PathBuf, recipe: Value) -> Result<Self> {
-        let steps = match std::fs::read(&path) {
+        let steps = match MappedFile::open(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
             Err(error) => return Err(Error::io("read", &path, error)),
             Ok(bytes) => {
                 let damaged = |error| Error::input(format!("{}: {error}", path.display()));
-                let found: Value = serde_json::from_slice(&bytes).map_err(damaged)?;
+                let found: Value = serde_json::from_slice(bytes.as_ref()).map_err(damaged)?;
                 recipe::expect_same(&path, &found.as_object().cloned().unwrap_or_default(), &recipe)?;
                 serde_json::from_value(found.get("steps").cloned().unwrap_or_default()).map_err(damaged)?
             }

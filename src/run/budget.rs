@@ -26,6 +26,7 @@ pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
 
 /// Bytes that the process may still map where its address space is limited (`ulimit -v`); half of what is left, since
 /// what is mapped is more than what is used.
+#[allow(clippy::disallowed_methods)] // the system's own files
 pub fn address_space_left() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let used = std::fs::read_to_string("/proc/self/statm").ok()?;

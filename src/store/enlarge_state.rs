@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::mapped;
+use super::mapped::{self, MappedFile};
 use crate::error::{Error, Result};
 
 const MAGIC: &[u8; 16] = b"btfkit enlarge 1";
@@ -40,8 +40,11 @@ impl EnlargeState {
     /// [`crate::Kind::Recipe`] where it is another recipe's; when the file is damaged.
     pub fn read(output: &Path, digest: &str) -> Result<Option<Self>> {
         let file = place(output);
-        match std::fs::read(&file) {
-            Ok(bytes) => Self::parse(&bytes, &file, digest).map(Some),
+        match MappedFile::open(&file) {
+            Ok(bytes) => Self::parse(bytes.as_ref(), &file, digest).map(Some),
+            Err(error) if error.kind() == std::io::ErrorKind::InvalidInput => {
+                Err(Error::input(format!("{}: {error}", file.display())))
+            }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(Error::io("read", &file, error)),
         }

@@ -3,6 +3,7 @@
 //! zarrs' own file store writes in place, so a kill leaves a torn shard that a later run takes for
 //! done. Here a write goes to a temporary name, is synced, renamed over the final name, and the
 //! directory is synced: a key holds all of a value or does not exist.
+#![allow(clippy::disallowed_methods)] // they are wrapped here
 
 use std::collections::hash_map::RandomState;
 use std::fs::{self, File, TryLockError};
@@ -221,6 +222,9 @@ fn remove_abandoned(path: &Path) {
         return;
     }
     let Ok(data) = fs::symlink_metadata(path) else { return };
+    if !data.is_file() && !data.is_dir() {
+        return;
+    }
     let opened = File::options().read(true).write(data.is_file()).open(path);
     let abandoned = match opened.as_ref().map(File::try_lock) {
         Ok(Ok(())) => true,
@@ -250,11 +254,17 @@ pub(crate) fn special(data: &fs::Metadata) -> Option<&'static str> {
     }
 }
 
-/// Refuses what is no file.
-pub(crate) fn refuse_special(data: &fs::Metadata) -> io::Result<()> {
-    special(data).map_or(Ok(()), |what| {
-        Err(io::Error::new(io::ErrorKind::InvalidInput, format!("got {what}, expected a file")))
-    })
+/// Opens a file to be read. A pipe would be waited for, and a device has no end.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidInput`] for what is no file; those of the system.
+pub(crate) fn open(path: &Path) -> io::Result<File> {
+    match special(&fs::metadata(path)?) {
+        None => File::open(path),
+        Some(what) => {
+            Err(io::Error::new(io::ErrorKind::InvalidInput, format!("got {what}, expected a file")))
+        }
+    }
 }
 
 /// A file mapped for reading.
@@ -270,9 +280,7 @@ impl MappedFile {
     /// Those of opening and mapping.
     #[allow(unsafe_code)]
     pub fn open(path: &Path) -> io::Result<Self> {
-        // Opening a pipe would wait for a writer.
-        refuse_special(&fs::metadata(path)?)?;
-        let file = File::open(path)?;
+        let file = open(path)?;
         if file.metadata()?.len() == 0 {
             return Ok(Self { map: None });
         }

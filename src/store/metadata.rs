@@ -3,13 +3,12 @@
 //! The member `btfkit` of a group's attributes decides about results. Its `seal` is the digest of all the rest of it;
 //! what an array's `zarr.json` must say follows from it ([`super::array`]). Attributes beside `btfkit` are free.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::mapped::{refuse_special, write_file};
+use super::mapped::{open, write_file};
 use crate::error::{Error, Result};
 use crate::run::recipe;
 
@@ -34,14 +33,12 @@ pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>> {
         std::io::ErrorKind::InvalidInput => Error::input(format!("{}: {error}", path.display())),
         _ => Error::io("read", path, error),
     };
-    let data = match std::fs::metadata(path) {
-        Ok(data) => data,
+    let file = match open(path) {
+        Ok(file) => file,
         Err(error) if is_absent(&error) => return Ok(None),
         Err(error) => return Err(failed(error)),
     };
-    refuse_special(&data).map_err(failed)?;
     let mut bytes = Vec::new();
-    let file = File::open(path).map_err(failed)?;
     file.take(LIMIT_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > LIMIT_BYTES {
         return Err(Error::input(format!(
@@ -184,6 +181,8 @@ pub(super) fn may_be_ignored(value: &Value) -> bool {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::fs::File;
+
     use super::*;
 
     #[test]

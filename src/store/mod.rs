@@ -388,7 +388,6 @@ impl Store {
     pub fn has_shard(&self, array: &Array, indices: &[u64]) -> bool {
         let path = self.chunk_path(array, indices);
         let chunks = array.shard_chunks().unwrap_or(0);
-        path.is_file()
-            && std::fs::File::open(path).and_then(|file| shard::has_index(file, chunks)).unwrap_or(false)
+        path.is_file() && mapped::open(&path).and_then(|file| shard::has_index(file, chunks)).unwrap_or(false)
     }
 }

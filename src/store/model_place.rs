@@ -3,11 +3,11 @@
 //! The file holds the way from the folder of the index to the model, so that both can be moved together. It is no part
 //! of what is made: the same index in another place has the same bytes in all other files.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use super::mapped::write_file;
+use super::mapped::{open, write_file};
 use crate::error::{Error, Result};
 
 /// The file.
@@ -57,7 +57,7 @@ fn read(index: &Path) -> Option<String> {
         return None;
     }
     let mut text = String::new();
-    File::open(path).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;
+    open(&path).ok()?.take(MOST_BYTES).read_to_string(&mut text).ok()?;
     Some(text)
         .filter(|way| !way.is_empty() && !way.contains(char::is_control) && Path::new(way).is_relative())
 }

@@ -9,7 +9,7 @@ use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use super::mapped::{self, Temporary, folder_of, publish, temporary_name, write_file};
+use super::mapped::{self, MappedFile, Temporary, folder_of, open, publish, temporary_name, write_file};
 use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
@@ -185,7 +185,7 @@ fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
         return Err(taken(path, "exists and is no file").hint("choose another name for the result"));
     }
     let length = fs::metadata(path).map_err(failed)?.len();
-    let file = BufReader::with_capacity(BUFFER_BYTES, File::open(path).map_err(failed)?);
+    let file = BufReader::with_capacity(BUFFER_BYTES, open(path).map_err(failed)?);
     let mut output = Output { to: To::Compare(file) };
     let written = write(&mut output);
     let different =
@@ -214,10 +214,12 @@ impl Folder {
         if !self.compared {
             return write_file(&path, bytes);
         }
-        match fs::read(&path) {
-            Ok(found) if found == bytes => Ok(()),
+        match MappedFile::open(&path) {
+            Ok(found) if found.as_ref() == bytes => Ok(()),
             Ok(_) => Err(different_folder(&self.root)),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Err(different_folder(&self.root)),
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
+                Err(different_folder(&self.root))
+            }
             Err(error) => Err(Error::io("read", &path, error)),
         }
     }
@@ -302,7 +304,7 @@ pub fn settle(temporary: &Path, path: &Path, existing: Existing) -> Result<Made>
         return Ok(Made::Written);
     }
     let failed = |error| Error::io("read", path, error);
-    let mut made = BufReader::with_capacity(BUFFER_BYTES, File::open(temporary).map_err(failed)?);
+    let mut made = BufReader::with_capacity(BUFFER_BYTES, open(temporary).map_err(failed)?);
     compare(path, |output| {
         io::copy(&mut made, output).map(|_| ()).map_err(|error| Error::io("write", path, error))
     })

@@ -1,14 +1,13 @@
 //! What lies at a path where a store is expected: so that whoever gave something else is told what it is, and what to
 //! do with it.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use btfkit_formats::{big, bonn, mif, mlvq};
 use serde_json::{Value, json};
 
-use super::mapped::{is_temporary, special};
+use super::mapped::{is_temporary, open, special};
 use super::metadata::read_object;
 use super::{enlarged, is_lock, measurement, model};
 use crate::error::{Error, Result};
@@ -64,7 +63,7 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
         return Ok(Some(Other { what: special.to_owned(), use_it: Use::Nothing }));
     }
     let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    let read = open(path).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
     read.map_err(|error| Error::io("read", path, error))?;
     Ok(Some(of_file(&head)))
 }

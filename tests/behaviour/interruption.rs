@@ -53,7 +53,7 @@ fn an_enlargement_killed_half_way_goes_on_to_the_same_bytes() {
 }
 
 /// An enlargement of many rows of shards, with its state beside them, killed once there is one.
-fn killed_with_a_state(output: &Path, more: &[&str]) -> Command {
+pub fn killed_with_a_state(output: &Path, more: &[&str]) -> Command {
     let run = || {
         let mut command = btf();
         command

@@ -270,6 +270,55 @@ fn what_has_the_name_of_a_shard_and_is_no_file_is_damage_and_not_missing() {
 }
 
 #[test]
+fn a_pipe_among_the_files_of_a_result_is_never_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let measurement = fixture().measurement();
+    let [pictures, zoom] = ["pictures", "zoom.dzi"].map(|name| folder.path().join(name));
+    let ended = |command: &mut Command| {
+        let code = command.status().unwrap().code();
+        assert_ne!(code, Some(124), "{command:?} hung");
+        code
+    };
+    let limited = |arguments: &[&str]| {
+        let mut command = Command::new("timeout");
+        command.args(["20", env!("CARGO_BIN_EXE_btf"), "export"]).args(arguments).stderr(Stdio::null());
+        command
+    };
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let of_pictures = [&text(&measurement), &text(&pictures), "--to", "png"];
+    let of_zoom = [&text(&fixture().enlarged()), &text(&zoom), "--deepzoom"];
+    for arguments in [&of_pictures[..], &of_zoom] {
+        assert_eq!(ended(&mut limited(arguments)), Some(0));
+    }
+    let tile = crate::fixture::tree_names(&folder.path().join("zoom_files"))
+        .into_iter()
+        .find(|path| path.extension().is_some_and(|ending| ending == "png"))
+        .unwrap();
+    let page = folder.path().join("zoom.html");
+    let picture = crate::fixture::tree_names(&pictures).pop().unwrap();
+    for (path, arguments) in
+        [(&picture, &of_pictures[..]), (&page, &of_zoom), (&zoom, &of_zoom), (&tile, &of_zoom)]
+    {
+        let kept = fs::read(path).unwrap();
+        fs::remove_file(path).unwrap();
+        assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+        ended(&mut limited(arguments));
+        let _ = fs::remove_file(path);
+        fs::write(path, kept).unwrap();
+    }
+    // The state of an enlargement, and the name of what a killed run left.
+    let index = folder.path().join("index.zarr");
+    let again = crate::interruption::killed_with_a_state(&index, &[]);
+    for name in [".index.tmp-host-1-1", "enlarge-state"] {
+        let _ = fs::remove_file(index.join(name));
+        assert!(Command::new("mkfifo").arg(index.join(name)).status().unwrap().success());
+        let mut limited = Command::new("timeout");
+        limited.args(["60", env!("CARGO_BIN_EXE_btf")]).args(again.get_args()).stderr(Stdio::null());
+        ended(&mut limited);
+    }
+}
+
+#[test]
 fn force_removes_only_what_is_of_its_kind() {
     let folder = tempfile::tempdir().unwrap();
     let foreign = folder.path().join("photos.zarr");

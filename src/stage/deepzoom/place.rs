@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use super::Encoding;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
-use crate::store::mapped::{self, MappedStorage, Temporary};
+use crate::store::mapped::{self, MappedFile, MappedStorage, Temporary};
 use crate::store::output::Existing;
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::store::{FORMAT, Store, is_lock, metadata};
@@ -162,7 +162,7 @@ impl Place {
     /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.
     /// One that says so already is left alone.
     pub(super) fn write_beside(&self, path: &Path, text: &str) -> Result<()> {
-        if std::fs::read(path).is_ok_and(|found| found == text.as_bytes()) {
+        if MappedFile::open(path).is_ok_and(|found| found.as_ref() == text.as_bytes()) {
             return Ok(());
         }
         let name = path.file_name().unwrap_or_default();

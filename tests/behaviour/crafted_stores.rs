@@ -27,6 +27,9 @@ fn told(store: &Path, context: &Context<'_>) -> String {
     }
 }
 
+/// Numbers of bytes from the beginning of an array, and what is written there.
+type Patches<'a> = Vec<(usize, &'a [u8])>;
+
 /// Changes elements of an array that lies in one chunk: numbers of bytes from its beginning, and bytes.
 fn patch(store: &Path, array: &str, patches: &[(usize, &[u8])]) {
     let chunks = tree_names(&store.join(array).join("c"));
@@ -57,7 +60,7 @@ fn numbers_that_no_model_has_are_found_behind_right_checksums() {
     let (causal, back, distant) = (site(0, 1), site(0, -1), site(65, 0));
     let (nan, large, zero) = (f64s(f64::NAN), f64s(1e9), f64s(0.0));
     let infinite_f64 = f64s(f64::INFINITY);
-    let cases: Vec<(Stage, &str, Vec<(usize, &[u8])>, &str)> = vec![
+    let cases: Vec<(Stage, &str, Patches<'_>, &str)> = vec![
         (Stage::Tile, "tile_source", vec![(0, &far)], "tile_source: row 2000"),
         (Stage::Tile, "tile_source", vec![(4, &far)], "column 2000 lie outside"),
         (Stage::Tile, "light_triangles", vec![(0, &[3, 0, 3, 0])], "light_triangles: not the triangles"),

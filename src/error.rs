@@ -240,4 +240,22 @@ mod tests {
         }
         assert_eq!(Error::list(Kind::Input, ["a\u{7}", "b"]).to_string(), "a\\u{7}\nb");
     }
+
+    #[test]
+    fn what_can_be_done_is_said_of_each_refusal_and_no_name_twice() {
+        for (kind, reading, words) in [
+            (ErrorKind::StorageFull, false, "free some space"),
+            (ErrorKind::QuotaExceeded, false, "quota"),
+            (ErrorKind::FileTooLarge, false, "ulimit -f"),
+            (ErrorKind::ReadOnlyFilesystem, false, "a place that can be written to"),
+            (ErrorKind::PermissionDenied, false, "a place that you may write to"),
+            (ErrorKind::PermissionDenied, true, "the right to read it"),
+        ] {
+            let (action, path) = (if reading { "read" } else { "write" }, Path::new("a.png"));
+            let error = Error::io(action, path, std::io::Error::from(kind)).at(path);
+            assert_eq!(error.kind(), Kind::Io);
+            assert_eq!(error.to_string().matches("a.png").count(), 1, "{error}");
+            assert!(error.guidance().unwrap().contains(words), "{kind}: {:?}", error.guidance());
+        }
+    }
 }

@@ -23,6 +23,8 @@ mod coherent_example;
 mod command_line;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
+#[path = "behaviour/crafted_stores.rs"]
+mod crafted_stores;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/damaged_stores.rs"]

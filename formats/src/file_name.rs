@@ -133,6 +133,7 @@ mod tests {
                 assert_eq!(found, at.cmp(&later), "{first} {second}");
             }
         }
+        assert!(natural_order("a", "a0").is_lt() && natural_order("a0", "a").is_gt());
         assert!(natural_order("p1.png", "p001.png").is_eq());
         assert!(natural_order("99999999999999999999999", "100000000000000000000000").is_lt());
     }

@@ -360,3 +360,85 @@ fn write_error(error: &zarrs::array::ArrayError) -> Error {
         None => failed,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_document_is_compared_member_by_member() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path());
+        let layout = |names| Layout::small::<u16>(names, &[4, 6]);
+        let with_units = layout(&["y", "x"]).with("units", "rad");
+        store.write("a", &with_units, &[0u16; 24]).unwrap();
+        let whole = store.array_document("a").unwrap();
+        let changed = |name: &str, value: Value| {
+            let mut document = whole.clone();
+            document.insert(name.to_owned(), value);
+            document
+        };
+        store.check_document("a", &with_units, &whole).map(drop).unwrap();
+        for (name, value, words) in [
+            ("shape", json!([4, 7]), "shape: got [4,7], expected [4,6]"),
+            ("data_type", json!("uint32"), "data_type: got"),
+            ("fill_value", json!(1), "fill_value: got 1"),
+            ("chunk_grid", json!(null), "chunk_grid: got null"),
+            ("codecs", json!([]), "codecs: got []"),
+            ("dimension_names", json!(["x", "y"]), "dimension_names: got"),
+            ("attributes", json!({"units": "degree"}), "attribute units: got \"degree\""),
+            ("attributes", json!({}), "attribute units: got null"),
+            ("more", json!({}), "member \"more\""),
+            ("storage_transformers", json!([1]), "member \"storage_transformers\""),
+        ] {
+            let error = store.check_document("a", &with_units, &changed(name, value)).map(drop).unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+        }
+        let error = store.check_document("a", &layout(&["y", "x"]), &changed("attributes", json!([])));
+        assert!(error.map(drop).unwrap_err().to_string().contains("expected an object"));
+        // What others may add, and names where any will do.
+        for (name, value) in [
+            ("attributes", json!({"units": "rad", "note": 1})),
+            ("more", json!({"must_understand": false})),
+            ("storage_transformers", json!([])),
+        ] {
+            store.check_document("a", &with_units, &changed(name, value)).map(drop).unwrap();
+        }
+        let document = changed("dimension_names", json!(["p", "q"]));
+        store.check_document("a", &layout(&[]), &document).map(drop).unwrap();
+    }
+
+    #[test]
+    fn shapes_are_claims() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path());
+        store.write("a", &Layout::small::<u16>(&[], &[4, 6]), &[0u16; 24]).unwrap();
+        let whole = store.array_document("a").unwrap();
+        assert_eq!(store.claimed_shape("a", 2).unwrap(), [4, 6]);
+        let lengths = "expected 2 lengths";
+        for (shape, words) in [
+            (json!([4]), lengths),
+            (json!([4, 6, 1]), lengths),
+            (json!([4, -6]), lengths),
+            (json!([1u64 << 33, 1]), lengths),
+            (json!(null), lengths),
+            (json!([1u64 << 31, 1u64 << 31]), "is too large"),
+        ] {
+            let mut document = whole.clone();
+            document.insert("shape".to_owned(), shape);
+            let text = Value::Object(document).to_string();
+            std::fs::write(store.metadata_path("a"), text).unwrap();
+            let error = store.read::<u16>("a", &[0, 0]).unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_the_system_refuses_keeps_its_advice_through_zarrs() {
+        let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+        let error = write_error(&StorageError::IOError(Arc::new(full)).into());
+        assert_eq!(error.kind(), Kind::Io);
+        assert!(error.guidance().unwrap().contains("space"), "{error}");
+    }
+}

@@ -189,4 +189,38 @@ mod tests {
         });
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
+
+    #[test]
+    fn many_share_a_lock_that_keeps_others_out_until_the_last_has_gone() {
+        let folder = tempfile::tempdir().unwrap();
+        let stop = AtomicBool::new(false);
+        let impatient = Impatient(&stop, Mutex::default());
+        let context = Context::new(&impatient, &stop, 1, 1 << 20).unwrap();
+        let share = || Lock::share(folder.path(), "", &context);
+        let (first, second) = (share().unwrap(), share().unwrap());
+        for lock in [first, second] {
+            stop.store(false, Ordering::Relaxed);
+            let kind = Lock::wait(folder.path(), "", &context).unwrap_err().kind();
+            assert_eq!(kind, Kind::Stopped);
+            assert!(folder.path().join(".lock").exists());
+            drop(lock);
+        }
+        stop.store(false, Ordering::Relaxed);
+        assert!(!folder.path().join(".lock").exists());
+        Lock::wait(folder.path(), "", &context).unwrap();
+    }
+
+    #[test]
+    fn what_the_dead_left_is_not_told_and_a_folder_that_went_is_made_again() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(".lock"), "process 1 on nowhere".repeat(3)).unwrap();
+        let stop = AtomicBool::new(false);
+        let impatient = Impatient(&stop, Mutex::default());
+        let context = Context::new(&impatient, &stop, 1, 1 << 20).unwrap();
+        let _held = Lock::wait(folder.path(), "", &context).unwrap();
+        assert!(Lock::wait(folder.path(), "", &context).is_err());
+        let told = impatient.1.into_inner().unwrap();
+        assert!(told.contains("process ") && !told.contains("nowhere"), "{told}");
+        assert!(open(&folder.path().join("moved/away/.lock")).is_ok());
+    }
 }

@@ -228,4 +228,51 @@ mod tests {
         std::fs::write(&path, "[".repeat(100_000)).unwrap();
         assert!(read_object(&path).is_err());
     }
+
+    #[test]
+    fn a_digest_is_that_of_the_recipe_beside_it() {
+        let entry = |value: Value| check_digest(value.as_object().unwrap());
+        let recipe = json!({"size": [3, 4]});
+        entry(json!({"other": 1})).unwrap();
+        entry(json!({"recipe": recipe, "digest": recipe::digest(&recipe)})).unwrap();
+        assert!(entry(json!({"digest": recipe::digest(&recipe)})).unwrap_err().contains("without a recipe"));
+        for digest in [json!("0"), json!(0), json!(null)] {
+            let error = entry(json!({"recipe": recipe, "digest": digest})).unwrap_err();
+            assert!(error.contains("that of the recipe"), "{error}");
+        }
+        assert!(entry(json!({"recipe": recipe})).unwrap_err().contains("got none"));
+    }
+
+    #[test]
+    fn groups_are_of_zarr_3_and_have_no_member_that_must_be_understood() {
+        let group = |value: Value| group_attributes(value.as_object().unwrap());
+        let found = group(json!({"zarr_format": 3, "node_type": "group", "attributes": {"a": 1}})).unwrap();
+        assert_eq!(Value::Object(found), json!({"a": 1}));
+        assert!(group(json!({"zarr_format": 3, "node_type": "group", "more": null})).unwrap().is_empty());
+        group(json!({"zarr_format": 3, "node_type": "group", "more": {"must_understand": false}})).unwrap();
+        for (document, words) in [
+            (json!({"zarr_format": 2, "node_type": "group"}), "zarr_format 3"),
+            (json!({"zarr_format": 3, "node_type": "array"}), "node_type group"),
+            (json!({"zarr_format": 3, "node_type": "group", "more": {}}), "\"more\""),
+            (json!({"zarr_format": 3, "node_type": "group", "more": {"must_understand": true}}), "\"more\""),
+            (json!({"zarr_format": 3, "node_type": "group", "attributes": []}), "expected an object"),
+        ] {
+            let error = group(document).unwrap_err();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_written_does_not_depend_on_the_order_and_what_is_there_is_left() {
+        use std::os::unix::fs::MetadataExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("zarr.json");
+        let object = |text: &str| serde_json::from_str::<Map<String, Value>>(text).unwrap();
+        write_object(&path, object(r#"{"b": {"d": 1, "c": 2}, "a": 3}"#)).unwrap();
+        let (bytes, file) = (std::fs::read(&path).unwrap(), std::fs::metadata(&path).unwrap().ino());
+        write_object(&path, object(r#"{"a": 3, "b": {"c": 2, "d": 1}}"#)).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
+        assert_eq!(std::fs::metadata(&path).unwrap().ino(), file, "it was written anew");
+        assert_eq!(String::from_utf8(bytes).unwrap().find("\"a\""), Some(4));
+    }
 }

@@ -41,17 +41,15 @@ pub(crate) fn note(store: &Path, file: &str, origin: &Path, expected: Option<&st
 
 /// Where the origin of a store may lie, the likeliest first; `name` is the one that is expected.
 pub(crate) fn places(store: &Path, file: &str, name: Option<&str>) -> Vec<PathBuf> {
-    // A trailing slash would make the store its own folder.
-    let given: PathBuf = store.components().collect();
     // Through links to the store itself: the way leads from where it lies.
-    let real = given.canonicalize().unwrap_or_else(|_| given.clone());
+    let real = store.canonicalize().unwrap_or_else(|_| store.to_owned());
     let mut places = Vec::new();
     if let (Some(way), Some(folder)) = (read(store, file), real.parent()) {
         places.push(folder.join(way));
     }
     let name = name.filter(|name| Path::new(name).file_name().is_some_and(|file| file == *name));
     // At last in the current folder.
-    for of in [given, real, PathBuf::new()] {
+    for of in [store, &real, Path::new("")] {
         if let Some(beside) = name.map(|name| of.with_file_name(name))
             && !places.contains(&beside)
         {
@@ -113,6 +111,14 @@ mod tests {
         let found = places(&index, MODEL, Some("a.model.zarr"));
         assert_eq!(found[0].canonicalize().unwrap(), model);
         assert_eq!(found[1..], [beside.clone(), PathBuf::from("a.model.zarr")]);
+        let slashed = PathBuf::from(format!("{}/", index.display()));
+        assert_eq!(places(&slashed, MODEL, Some("a.model.zarr")), found);
+        // Through a link the way leads from where the index lies.
+        let link = root.join("link.zarr");
+        std::os::unix::fs::symlink(&index, &link).unwrap();
+        let found = places(&link, MODEL, Some("a.model.zarr"));
+        assert_eq!(found[0].canonicalize().unwrap(), model);
+        assert_eq!(found[1..3], [root.join("a.model.zarr"), beside.clone()]);
         // Noted again from beside it, nothing is left to note.
         note(&index, MODEL, &beside, None).unwrap();
         assert!(!index.join(MODEL).exists());
@@ -134,6 +140,10 @@ mod tests {
         assert_eq!(places(&index, MODEL, Some("../up")), [] as [PathBuf; 0]);
         fs::remove_file(index.join(MODEL)).unwrap();
         fs::create_dir(index.join(MODEL)).unwrap();
+        assert_eq!(places(&index, MODEL, None), [] as [PathBuf; 0]);
+        fs::remove_dir(index.join(MODEL)).unwrap();
+        // Reading a pipe would wait for a writer.
+        assert!(std::process::Command::new("mkfifo").arg(index.join(MODEL)).status().unwrap().success());
         assert_eq!(places(&index, MODEL, None), [] as [PathBuf; 0]);
     }
 }

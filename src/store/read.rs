@@ -248,3 +248,70 @@ fn copy<T: Copy>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::error::Kind;
+    use std::fs;
+
+    #[test]
+    fn a_box_lies_in_its_array_and_has_its_type() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path());
+        let layout = Layout::small::<u16>(&["y", "x"], &[4, 6]);
+        let elements: Vec<u16> = (0..24).collect();
+        store.write("a", &layout, &elements).unwrap();
+        let array = store.open_array("a", &layout).unwrap();
+        assert_eq!(store.read_box::<u16>(&array, &[1, 2], &[2, 3]).unwrap(), [8, 9, 10, 14, 15, 16]);
+        assert_eq!(store.read_box::<u16>(&array, &[4, 0], &[0, 6]).unwrap(), [0; 0]);
+        for (start, extent) in [
+            (&[0, 0][..], &[4, 7][..]),
+            (&[1, 0], &[4, 6]),
+            (&[u64::MAX, 0], &[2, 1]),
+            (&[0], &[4]),
+            (&[0, 0], &[4]),
+            (&[0, 0, 0], &[4, 6, 0]),
+        ] {
+            let error = store.read_box::<u16>(&array, start, extent).unwrap_err();
+            assert!(error.to_string().contains("expected it to hold"), "{error}");
+        }
+        let error = store.read_box::<i16>(&array, &[0, 0], &[4, 6]).unwrap_err();
+        assert!(error.to_string().contains("got elements of type uint16"), "{error}");
+        let layout = Layout::small::<u16>(&["y", "x"], &[1 << 20, 1 << 20]);
+        let array = store.create_array("large", &layout).unwrap();
+        let error = store.read_box::<u16>(&array, &[0, 0], array.shape()).unwrap_err();
+        assert!(error.to_string().contains("is too large"), "{error}");
+    }
+
+    #[test]
+    fn a_chunk_is_a_file_of_the_size_that_its_layout_gives() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::at(folder.path());
+        let layout = Layout::small::<u16>(&["x"], &[6]);
+        store.write("a", &layout, &[1u16; 6]).unwrap();
+        let chunk = folder.path().join("a/c/0");
+        let told = || {
+            let error = store.read_array::<u16>("a", &layout).unwrap_err();
+            (error.kind(), error.to_string(), error.guidance().unwrap_or_default().to_owned())
+        };
+        fs::write(&chunk, zstd::bulk::compress(&[1u8; 10], 3).unwrap()).unwrap();
+        let (kind, text, _) = told();
+        assert_eq!(kind, Kind::Input);
+        assert!(text.contains("got a chunk of 10 bytes, expected 12"), "{text}");
+        fs::remove_file(&chunk).unwrap();
+        let missing = |(kind, text, advice): (Kind, String, String)| {
+            assert_eq!(kind, Kind::Missing, "{text}");
+            assert!(text.contains("has not been written") && advice.contains("goes on"), "{text}: {advice}");
+        };
+        missing(told());
+        fs::create_dir(&chunk).unwrap();
+        let (kind, text, advice) = told();
+        assert_eq!((kind, advice.as_str()), (Kind::Input, DAMAGED), "{text}");
+        // A file where the folder of the chunks should be.
+        fs::remove_dir_all(folder.path().join("a/c")).unwrap();
+        fs::write(folder.path().join("a/c"), "").unwrap();
+        missing(told());
+    }
+}

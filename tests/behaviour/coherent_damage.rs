@@ -10,7 +10,7 @@ use crate::coherent::{enlarge, model};
 use crate::fixture::{btf, copy, fail, succeed, tree};
 
 /// Changes a member of a JSON file, or takes it away.
-fn change(file: &Path, pointer: &str, value: Option<Value>) {
+pub fn change(file: &Path, pointer: &str, value: Option<Value>) {
     let mut metadata: Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
     let (parent, member) = pointer.rsplit_once('/').unwrap();
     let parent = metadata.pointer_mut(parent).unwrap_or_else(|| panic!("no {parent}"));

@@ -62,12 +62,12 @@ fn small() -> &'static Small {
 }
 
 /// A copy of all of it, to be damaged and mended again.
-struct Copy {
+pub struct Copy {
     folder: TempDir,
 }
 
 impl Copy {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         for (name, bytes) in tree(small().folder.path()) {
             let to = folder.path().join(name);
@@ -77,12 +77,12 @@ impl Copy {
         Self { folder }
     }
 
-    fn place(&self, name: &str) -> PathBuf {
+    pub fn place(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 }
 
-fn with_context<T>(work: impl FnOnce(&Context<'_>) -> T) -> T {
+pub fn with_context<T>(work: impl FnOnce(&Context<'_>) -> T) -> T {
     let stop = AtomicBool::new(false);
     work(&Context::new(&Silent, &stop, 2, 1 << 28).unwrap())
 }

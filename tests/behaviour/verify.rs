@@ -77,3 +77,51 @@ fn shards_in_any_number_and_order_give_the_same_bytes() {
     }
     fail(btf().arg("import").arg(fixture().archive()).args(["--shard", "4/4"]), 2);
 }
+
+/// Copies the files of a row of shards over those of another, in these arrays.
+fn exchange(store: &Path, arrays: &[&str], [from, to]: [&str; 2]) {
+    for array in arrays {
+        let (from, to) = (store.join(array).join("c").join(from), store.join(array).join("c").join(to));
+        for (name, bytes) in crate::fixture::tree(&from) {
+            std::fs::write(to.join(name), bytes).unwrap();
+        }
+    }
+}
+
+#[test]
+fn shards_that_fit_together_in_the_place_of_others_are_found_by_their_checksums() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = copied(folder.path());
+    exchange(&store, &["reflectance", "luminance"], ["2", "3"]);
+    let output = btf().arg("verify").arg(&store).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(65), "{told}");
+    assert!(told.contains("of view 3") && told.contains("the shard of another view"), "{told}");
+    let store = folder.path().join("big.zarr");
+    copy(&fixture().enlarged(), &store);
+    exchange(&store, &["index", "normals"], ["0", "1"]);
+    let output = btf().arg("verify").arg(&store).arg("--model").arg(fixture().model()).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(65), "{told}");
+    for folder in ["index/c/1", "normals/c/1"] {
+        assert!(told.contains(&format!("{folder}: the checksum of this row of shards")), "{told}");
+    }
+}
+
+#[test]
+fn what_is_only_missing_is_not_called_damaged() {
+    for (store, lost, other) in [
+        ("m.zarr", "normals/c/0/0/0", "index/c/0/0"),
+        ("coherent.zarr", "normals/c/0/0/0", "index/c/0/0"),
+        ("p_files", "0/0_0.png", "1/0_0.png"),
+    ] {
+        let copy = crate::damaged_stores::Copy::new();
+        let store = copy.place(store);
+        std::fs::remove_file(store.join(lost)).unwrap();
+        let told = fail(btf().arg("verify").arg(&store), 66);
+        assert!(told.contains("not whole"), "{told}");
+        std::fs::write(store.join(other), "damaged").unwrap();
+        let told = fail(btf().arg("verify").arg(&store), 65);
+        assert!(told.contains("damaged"), "{told}");
+    }
+}

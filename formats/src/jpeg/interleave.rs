@@ -426,3 +426,20 @@ impl Writer {
         self.out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_coefficients_are_those_that_are_written() {
+        assert_eq!(checked_size(15).unwrap(), 15);
+        assert!(checked_size(16).is_err() && checked_size(255).is_err());
+        for value in [-0x4000, -1, 0, 0x3FFF] {
+            assert_eq!(i32::from(coefficient(value).unwrap()), value);
+        }
+        for value in [-0x4001, 0x4000, i32::MIN, i32::MAX] {
+            assert!(coefficient(value).is_err(), "{value}");
+        }
+    }
+}

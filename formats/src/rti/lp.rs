@@ -323,6 +323,7 @@ mod tests {
             ("1\na.png nan 0 1\n", &["line 2", "NaN", "finite"]),
             ("2\na.png 0 0 1\n1 0 1\n", &["line 3 without a name", "line 2 with one"]),
             ("2\na.png 0 0 1\n3\n", &["line 3", "\"3\""]),
+            ("2\n2\na.png 0 0 1\n", &["line 2", "\"2\""]),
             ("1\n/ 0 0 1\n", &["line 2", "\"/\""]),
             ("1\np0.png 1 0.1 0.8 1\n", &["line 2", "\"1\" before", "three numbers"]),
             ("1\np0.png\t-1,5\t0\t0\t1\n", &["line 2", "\"-1,5\" before", "three numbers"]),

@@ -13,19 +13,25 @@ struct Coefficients {
     factors: Vec<(usize, usize)>,
     most: (usize, usize),
     blocks: Vec<Vec<Block>>,
+    /// Quantisation tables, the last one for all other components.
+    tables: Vec<[u16; 64]>,
+    /// What an Adobe segment says of the colours.
+    adobe: Option<u8>,
 }
 
 impl Coefficients {
     fn new(width: u16, height: u16, factors: &[(usize, usize)]) -> Coefficients {
         let most = (factors.iter().map(|f| f.0).max().unwrap(), factors.iter().map(|f| f.1).max().unwrap());
-        let mut made = Coefficients { width, height, factors: factors.to_vec(), most, blocks: Vec::new() };
+        let (factors, tables) = (factors.to_vec(), vec![[1; 64]]);
+        let mut made = Coefficients { width, height, factors, most, blocks: Vec::new(), tables, adobe: None };
         let (across, down) = made.units();
         let mut state = 12345u32;
         let mut random = |below: u32| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             i16::try_from((state >> 8) % below).unwrap()
         };
-        made.blocks = factors
+        made.blocks = made
+            .factors
             .iter()
             .map(|&(h, v)| {
                 let block = |_| {
@@ -80,15 +86,27 @@ impl Coefficients {
             out.extend(u16::try_from(data.len() + 2).unwrap().to_be_bytes());
             out.extend(data);
         };
-        segment(&mut out, 0xDB, &[&[0][..], &[1; 64]].concat());
+        if let Some(transform) = self.adobe {
+            segment(&mut out, 0xEE, &[&b"Adobe\0\x64\0\0\0\0"[..], &[transform]].concat());
+        }
+        let is_wide = |table: &[u16; 64]| table.iter().any(|&value| value > 255);
+        for (number, table) in (0u8..).zip(&self.tables) {
+            let bytes = table
+                .iter()
+                .flat_map(|value| value.to_be_bytes().into_iter().skip(usize::from(!is_wide(table))));
+            let slot = u8::from(is_wide(table)) << 4 | number;
+            segment(&mut out, 0xDB, &[slot].into_iter().chain(bytes).collect::<Vec<u8>>());
+        }
         let mut frame = vec![8];
         frame.extend(self.height.to_be_bytes());
         frame.extend(self.width.to_be_bytes());
         frame.push(u8::try_from(self.factors.len()).unwrap());
         for (id, &(h, v)) in (1u8..).zip(&self.factors) {
-            frame.extend([id, u8::try_from(h << 4 | v).unwrap(), 0]);
+            let table = usize::from(id).min(self.tables.len()) - 1;
+            frame.extend([id, u8::try_from(h << 4 | v).unwrap(), u8::try_from(table).unwrap()]);
         }
-        segment(&mut out, 0xC0, &frame);
+        // Wide tables are not of the baseline.
+        segment(&mut out, if self.tables.iter().any(is_wide) { 0xC1 } else { 0xC0 }, &frame);
         // Codes of one length: 12 sizes of means; 16 runs of 10 sizes, the end of a block and 16 zeros.
         let table = |slot: u8, length: usize, symbols: &[u8]| {
             let mut counts = [0; 16];
@@ -264,6 +282,33 @@ fn ids_of_colours_count_where_no_segment_does_however_scans_are_arranged() {
         assert_eq!(samples(&insert(&named, jfif)), ycbcr, "{scans:?}");
         assert_eq!(samples(&insert(&named, &adobe(1))), ycbcr, "{scans:?}");
         assert_eq!(samples(&insert(&insert(&named, &adobe(0)), jfif)), ycbcr, "{scans:?}");
+    }
+}
+
+#[test]
+fn the_tables_of_each_component_and_the_meaning_of_colours_stay() {
+    let factors = FACTORS[3];
+    let plain = Coefficients::new(33, 31, &factors);
+    let unlike = samples(&plain.written(&[&[0, 1, 2]], 0));
+    let mut wide = [1; 64];
+    wide[32..].fill(300);
+    for (tables, adobe) in [
+        (vec![[1; 64], [2; 64], [3; 64]], None),
+        (vec![[3; 64], [1; 64]], None),
+        (vec![wide], None),
+        (vec![[1; 64], wide, [2; 64]], None),
+        (vec![[1; 64]], Some(0)),
+    ] {
+        let picture = Coefficients { tables, adobe, ..Coefficients::new(33, 31, &factors) };
+        let expected = samples(&picture.written(&[&[0, 1, 2]], 0));
+        assert!(expected != unlike, "{:?} {adobe:?} change the picture", picture.tables);
+        for scans in SCANS {
+            assert!(
+                samples(&picture.written(scans, 2)) == expected,
+                "{:?} {adobe:?} {scans:?}",
+                picture.tables
+            );
+        }
     }
 }
 

@@ -252,15 +252,16 @@ fn what_is_said_of_other_bytes_is_refused() {
     let mut sketch = grey();
     sketch.scale_6d = reals(3, 1.0, 2.0, &[20, 0, 30, 200, 240, 0]);
     let bytes = sketch.bytes();
-    for text in [
-        "PDF6Dscale 0 0 1.0",
-        "PDF6Dscale 0 1 1.5",
-        "PDF6Dscale 9 1 1.0",
-        "PDF6Dscale 0 4 1.0",
-        "colors 0 0 127.0",
+    for (text, words) in [
+        ("PDF6Dscale 0 0 1.0", "not ambiguous"),
+        ("PDF6Dscale 0 1 1.5", "the value 1 or 2"),
+        ("PDF6Dscale 9 1 1.0", "places in the table's 2 rows and 3 columns"),
+        ("PDF6Dscale 0 4 1.0", "places in the table's 2 rows and 3 columns"),
+        ("colors 0 0 127.0", "not ambiguous"),
     ] {
         let error = Database::open(&bytes, &ZeroBytes::parse(text).unwrap(), &Limits::default()).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Argument, "{text}: {error}");
+        assert!(error.to_string().contains(words), "{text}: {error}");
     }
     for text in ["PDF7Dscale 0 0 1.0", "PDF6Dscale 0 1", "PDF6Dscale -1 0 1", "PDF6Dscale 0 0 nan"] {
         let error = ZeroBytes::parse(&format!("# comment\n{text}\n")).unwrap_err();

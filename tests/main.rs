@@ -21,6 +21,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/contradictions.rs"]
+mod contradictions;
 #[path = "behaviour/curve.rs"]
 mod curve;
 #[path = "behaviour/damaged_stores.rs"]

@@ -174,23 +174,32 @@ impl NumberPrefix {
     }
 }
 
-/// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by half:
-/// `7,5`, `7p5`, `4.5e+01`, `1.2.3`.
+/// Letters that stand for the decimal point, or before an exponent.
+const LETTERS_IN_NUMBERS: [char; 6] = ['p', 'P', 'd', 'D', 'e', 'E'];
+
+/// Marks after which another number may follow, so that they are no decimal point.
+const BETWEEN_NUMBERS: &str = "_- \t=+()[]{}<>#@~&%/\\";
+
+/// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by
+/// half: `7,5`, `7p5`, `7d5`, `4.5e+01`, `1.2.3`. Any mark counts that does not stand between numbers (the world has more decimal
+/// points than can be listed), and digits of any script.
 pub(crate) fn goes_on(rest: &str) -> bool {
+    let digit = |c: char| c.is_numeric();
     let mut chars = rest.chars();
-    let Some(mark) = chars.next().filter(|mark| ",.'pPeE\u{b7}\u{2019}".contains(*mark)) else {
-        return false;
-    };
+    let Some(mark) = chars.next() else { return false };
     let after = chars.as_str();
-    let after = if "eE".contains(mark) { after.strip_prefix(['+', '-']).unwrap_or(after) } else { after };
-    after.starts_with(|c: char| c.is_ascii_digit())
+    let after = if "dDeE".contains(mark) { after.strip_prefix(['+', '-']).unwrap_or(after) } else { after };
+    // Digits that are not ASCII: fractions, and other scripts.
+    digit(mark)
+        || (LETTERS_IN_NUMBERS.contains(&mark) || !(mark.is_alphanumeric() || BETWEEN_NUMBERS.contains(mark)))
+            && after.starts_with(digit)
 }
 
 /// The same for names without a pattern, where a dash, an underscore or a blank may stand for the point as well:
 /// digits there belong to no label.
 pub(crate) fn digits_are_left(rest: &str) -> bool {
     let after = rest.strip_prefix(['_', '-', ' ']);
-    goes_on(rest) || after.is_some_and(|after| after.starts_with(|c: char| c.is_ascii_digit()))
+    goes_on(rest) || after.is_some_and(|after| after.starts_with(char::is_numeric))
 }
 
 #[cfg(test)]
@@ -230,13 +239,41 @@ mod tests {
 
     #[test]
     fn numbers_that_go_on() {
-        for rest in [",5", "p5", "P5_x", "e+01", "E1", ".3", "'5", "·5"] {
+        for rest in [
+            ",5",
+            "p5",
+            "P5_x",
+            "d5",
+            "D5_",
+            "e+01",
+            "d-1",
+            "E1",
+            ".3",
+            "'5",
+            "·5",
+            "\u{66b}5",
+            "\u{66b}\u{665}",
+            "\u{ff0e}\u{ff15}",
+            "\u{ff0c}5",
+            "\u{2396}5",
+            "\u{2009}5",
+            "\u{2212}5",
+            ";5",
+            ":5",
+            "*5",
+            "`5",
+            "½",
+            "\u{ff15}",
+            "\u{665}",
+        ] {
             assert!(goes_on(rest) && digits_are_left(rest), "{rest}");
         }
         for rest in ["_5", "-5", " 5"] {
             assert!(!goes_on(rest) && digits_are_left(rest), "{rest}");
         }
-        for rest in ["", "_pl5", ".png", "pl30", "po5", "ev2", "p", "--5", "x5", "_"] {
+        for rest in
+            ["", "_pl5", ".png", "pl30", "po5", "ev2", "deg", "d", "p", "--5", "x5", "_", "(2)", "°_5"]
+        {
             assert!(!digits_are_left(rest), "{rest}");
         }
     }

@@ -13,6 +13,7 @@ mod frame;
 mod huffman;
 mod interleave;
 mod marker;
+pub(crate) mod profile;
 mod progress;
 mod structure;
 

@@ -20,6 +20,7 @@ mod foreign;
 mod hdr;
 pub(crate) mod orientation;
 pub mod png;
+pub(crate) mod profile;
 mod size;
 mod tiff;
 mod wavelength;
@@ -87,9 +88,12 @@ pub struct PictureHeader {
     pub linear: bool,
     /// A Radiance picture whose resolution line names X first, so that [`HdrOrientation`] matters.
     pub scanlines_are_columns: bool,
-    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF): 1..=8, 1 being as stored
+    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF, XMP): 1..=8, 1 being as stored
     /// and what is meant where it says nothing. Samples are handed out as stored.
     pub orientation: u8,
+    /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an ICC
+    /// profile, a gamma, code points (JPEG, PNG, TIFF).
+    pub profile: Option<String>,
     /// The one layer of an OpenEXR picture whose channels are all in it.
     pub layer: Option<String>,
 }
@@ -134,7 +138,7 @@ pub fn recognise(bytes: &[u8]) -> Option<Format> {
 /// Like [`decode()`], for the header.
 pub fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
     match require_format(bytes)? {
-        Format::Jpeg => jpeg::header(bytes, limits).map(of_jpeg),
+        Format::Jpeg => jpeg::header(bytes, limits).map(|header| of_jpeg(header, bytes)),
         Format::Png => png::header(bytes, limits),
         Format::Tiff => tiff::header(bytes, limits),
         Format::Hdr => hdr::header(bytes, limits),
@@ -149,7 +153,7 @@ pub fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
 /// Like [`decode()`], but for errors in compressed data and for alpha that is not opaque.
 pub fn check(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
     match require_format(bytes)? {
-        Format::Jpeg => jpeg::check(bytes, limits).map(of_jpeg),
+        Format::Jpeg => jpeg::check(bytes, limits).map(|header| of_jpeg(header, bytes)),
         Format::Png => png::check(bytes, limits),
         Format::Tiff => tiff::check(bytes, limits),
         Format::Hdr => hdr::check(bytes, limits),
@@ -206,7 +210,7 @@ fn require_format(bytes: &[u8]) -> Result<Format> {
     })
 }
 
-fn of_jpeg(header: jpeg::Header) -> PictureHeader {
+fn of_jpeg(header: jpeg::Header, bytes: &[u8]) -> PictureHeader {
     PictureHeader {
         width: header.width,
         height: header.height,
@@ -215,6 +219,7 @@ fn of_jpeg(header: jpeg::Header) -> PictureHeader {
         linear: false,
         scanlines_are_columns: false,
         orientation: header.orientation,
+        profile: jpeg::profile::profile(bytes),
         layer: None,
     }
 }

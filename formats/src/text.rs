@@ -4,8 +4,12 @@ use std::borrow::Cow;
 
 use crate::{Error, ErrorKind, Result};
 
+/// What DOS programs put behind the last character.
+const DOS_END: u8 = 0x1A;
+
 /// The bytes of a text as UTF-8 without a byte order mark: those given, or UTF-16 (PowerShell, Notepad's "Unicode")
-/// rewritten if its mark says so. What is not UTF-8 inside an unmarked text is left to the reader.
+/// rewritten if its mark says so. The ^Z with which DOS programs end a text is left out. What is not UTF-8 inside an
+/// unmarked text is left to the reader.
 ///
 /// # Errors
 /// [`ErrorKind::Unsupported`]: UTF-32, or UTF-16 without its mark (told by a zero byte among the first four).
@@ -24,6 +28,7 @@ pub fn utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>> {
     };
     match bytes {
         [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => refused("a text in UTF-32"),
+        [rest @ .., DOS_END] => utf8(rest),
         [0xEF, 0xBB, 0xBF, rest @ ..] => Ok(Cow::Borrowed(rest)),
         [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
@@ -70,6 +75,7 @@ mod tests {
             let error = utf8(&bytes).unwrap_err();
             assert!(error.to_string().contains(words), "{error}");
         }
+        assert_eq!(&*utf8(b"ab\x1A\x1A").unwrap(), b"ab");
         // A name in another encoding is the reader's to judge.
         assert_eq!(&*utf8(b"\xFCx").unwrap(), b"\xFCx");
         assert!(utf8(b"").unwrap().is_empty());

@@ -17,6 +17,11 @@ pub(super) struct Found {
     pub(super) assumptions: Vec<String>,
 }
 
+/// What to do where names tell nothing.
+const NAMES: &str = "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern \
+     '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' says where the angles stand, --table FILE.csv lists them, \
+     `btf import --help` explains";
+
 const FRONTAL: &str = "there are no view directions: one frontal view";
 
 /// Sorts out the files of an archive.
@@ -25,7 +30,11 @@ const FRONTAL: &str = "there are no view directions: one frontal view";
 /// Names every missing and every duplicate image; or says why the names tell nothing.
 pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Limits) -> Result<Found> {
     let complete = |pairs: Vec<Option<Pair>>| {
-        Catalogue::from_pairs(files.names().zip(pairs)).map_err(|errors| incomplete(archive, &errors))
+        // A picture that gives no direction may be one that is missing.
+        let left = left_out(files, pairs.iter().map(Option::is_none));
+        let shown: Vec<String> = (0..files.len()).map(|number| files.shown(number)).collect();
+        Catalogue::from_pairs(shown.iter().map(String::as_str).zip(pairs))
+            .map_err(|errors| incomplete(archive, &errors, left))
     };
     if let Some(path) = &options.table {
         let table = table::read(&read_beside(path)?, limits)
@@ -54,10 +63,7 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
     }
     if let Some(name) = files.names().find(|name| ubo2003::half_read(name)) {
         let found = format!("{name}: digits that belong to no label are left over behind an angle");
-        return Err(Error::input(found).context(archive.display()).hint(
-            "angles have a decimal point (tl7.5); --pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}.png' says what \
-             digits do not matter, --table FILE.csv lists the angles",
-        ));
+        return Err(Error::input(found).context(archive.display()).hint(for_digits_left(name)));
     }
     let pairs: Vec<Option<Pair>> = files.names().map(of_ubo2003_name).collect();
     if pairs.iter().any(Option::is_some) {
@@ -71,12 +77,29 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         if let Some(foreign) = files.foreign() {
             return Error::input(foreign).context(archive.display());
         }
-        Error::from(error).context(archive.display()).hint(
-            "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' \
-             says where the angles stand, --table FILE.csv lists them, `btf import --help` explains",
-        )
+        let counted = files.names().find(|name| without_counter(name).is_some());
+        Error::from(error).context(archive.display()).hint(counted.map_or(NAMES.to_owned(), for_digits_left))
     })?;
     by_pattern(&pattern, files, complete)
+}
+
+/// What to do about a name with digits behind an angle, which may be a fraction or a counter.
+fn for_digits_left(name: &str) -> String {
+    let counter = match without_counter(name) {
+        Some(pattern) => format!("if the last digits only count: --pattern '{pattern}'"),
+        None => "--pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}' says what digits do not matter"
+            .to_owned(),
+    };
+    format!("angles have a decimal point (tl7.5); {counter}; --table FILE.csv lists the angles")
+}
+
+/// The pattern of a name that ends in a counter, if there is one when that is left out.
+fn without_counter(name: &str) -> Option<String> {
+    let (stem, ending) = name.rsplit_once('.')?;
+    let before = stem.trim_end_matches(|c: char| c.is_ascii_digit());
+    let head = before.strip_suffix(['_', '-', ' ']).filter(|_| before.len() < stem.len())?;
+    let pattern = named::recognise([format!("{head}.{ending}").as_str()]).ok()?;
+    Some(format!("{pattern}{}{{n}}", &before[head.len()..]))
 }
 
 fn by_pattern(
@@ -119,11 +142,15 @@ fn by_light_lists(
         let same = matches!((earlier, &lights), (Ok(a), Ok(b)) if a.pairs == b.pairs);
         if !same {
             let found =
-                format!("{} and {} are two light lists that differ", files.name(*first), files.name(list));
-            return Err(Error::input(found).hint(format!(
-                "import the one that is meant, with the pictures beside it: btf import {:?}",
-                files.name(list)
-            )));
+                format!("{} and {} are two light lists that differ", files.shown(*first), files.shown(list));
+            let hint = match files.is_zipped(*first) || files.is_zipped(list) {
+                true => "unpack the archive to a folder, and import the list there that is meant".to_owned(),
+                false => format!(
+                    "import the one that is meant, with the pictures beside it: btf import {:?}",
+                    files.name(list)
+                ),
+            };
+            return Err(Error::input(found).hint(hint));
         }
     }
     let Some((_, lights)) = read else { return Err(Error::internal("no light list")) };
@@ -160,14 +187,17 @@ fn match_files(
     rows: Vec<(Listed<'_>, Pair, usize)>,
 ) -> Result<(Vec<Option<Pair>>, Option<String>)> {
     let folder = list.parent().unwrap_or(Path::new(""));
-    let matcher = Matcher::new(files.names());
+    let shown = |number| files.shown(number);
+    let matcher = Matcher::new(files.names(), &shown);
     let mut pairs = vec![None; files.len()];
     let mut lines = vec![0; files.len()];
     let (mut different, mut example) = (0, None);
     for (listed, pair, line) in rows {
-        let found = matcher.find(&listed, folder).map_err(|error| error.context(list.display()))?;
+        let found = matcher
+            .find(&listed, folder)
+            .map_err(|error| error.context(format!("{}, line {line}", list.display())))?;
         if pairs[found.number].is_some() {
-            let name = files.name(found.number);
+            let name = files.shown(found.number);
             let twice =
                 format!("{}: the lines {} and {line} mean {name}", list.display(), lines[found.number]);
             return Err(Error::input(twice).hint("each picture has one line"));
@@ -199,11 +229,21 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
     }
     let neighbours = || pictures.iter().zip(pictures.iter().skip(1));
     let name = |number: usize| files.name(number);
-    if let Some((&a, &b)) = neighbours().find(|&(&a, &b)| natural_order(name(a), name(b)).is_eq()) {
+    let small = |number: usize| name(number).to_lowercase();
+    let unsure = |&(&a, &b): &(&usize, &usize)| natural_order(&small(a), &small(b)).is_ge();
+    if let Some((&a, &b)) = neighbours().find(unsure) {
         let found = format!(
             "{list}: lights without names, and {} and {}, of which either may be first",
             name(a),
             name(b)
+        );
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
+    let other_digits = |name: &str| name.contains(|c: char| c.is_numeric() && !c.is_ascii_digit());
+    if let Some(&number) = pictures.iter().find(|&&number| other_digits(name(number))) {
+        let found = format!(
+            "{list}: lights without names, and {}, whose number has digits other than 0 to 9",
+            name(number)
         );
         return Err(Error::input(found).hint("put the names of the pictures into the list"));
     }
@@ -230,8 +270,24 @@ fn has_extension(name: &str, extension: &str) -> bool {
     Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
-fn incomplete(archive: &Path, errors: &CatalogueErrors) -> Error {
-    Error::list(Kind::Input, errors.to_string().lines())
+/// Names of pictures that a note or an error lists.
+const NAMED: usize = 4;
+
+/// What to know of pictures that are left out, as nothing gives their directions; `left` says it of each file.
+pub(super) fn left_out(files: &Files, left: impl Iterator<Item = bool>) -> Option<String> {
+    let names: Vec<String> = (0..files.len())
+        .zip(left)
+        .filter(|&(number, left)| left && is_picture(files.name(number)))
+        .map(|(number, _)| format!("{:?}", files.shown(number)))
+        .collect();
+    let more = if names.len() > NAMED { format!(" and {} more", names.len() - NAMED) } else { String::new() };
+    let shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    (!names.is_empty()).then(|| format!("pictures without directions are left out: {shown}{more}"))
+}
+
+fn incomplete(archive: &Path, errors: &CatalogueErrors, left_out: Option<String>) -> Error {
+    let lines: Vec<String> = errors.to_string().lines().map(str::to_owned).chain(left_out).collect();
+    Error::list(Kind::Input, lines)
         .context(archive.display())
         .hint("expected one picture for each pair of directions")
 }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::Limits;
@@ -28,6 +28,10 @@ const LEFT_BEHIND: [&str; 7] = [
 
 /// Bytes that tell what a file is.
 const HEAD_BYTES: u64 = 512;
+
+/// How the record at the end of a zip begins, and the most bytes that it takes with its comment.
+const END_OF_ZIP: &[u8; 4] = b"PK\x05\x06";
+const LONGEST_END: u64 = 22 + 65535;
 
 /// Files that are looked at for what they are, where no picture is found.
 const SNIFFED: usize = 64;
@@ -132,13 +136,16 @@ impl Files {
 
     /// What the first files are that are of a known format that is not read, and what to do about it.
     pub(super) fn foreign(&self) -> Option<String> {
-        let told = |entry: &Entry| {
-            let Place::Plain(path) = &entry.place else { return None };
-            let head = read_head(path, HEAD_BYTES).ok()?;
-            let (what, way_out) = picture::foreign(&entry.name, &head)?;
-            Some(format!("{} is {what}, which is not read: {way_out}", entry.name))
+        let told = |number: usize| {
+            let head = match &self.entries.get(number)?.place {
+                Place::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
+                Place::Zipped { .. } => self.bytes(number).ok()?,
+            };
+            let (what, way_out) = picture::foreign(self.name(number), &head)?;
+            self.release(number);
+            Some(format!("{} is {what}, which is not read: {way_out}", self.shown(number)))
         };
-        self.entries.iter().take(SNIFFED).find_map(told)
+        (0..self.len().min(SNIFFED)).find_map(told)
     }
 
     /// The light list that was named.
@@ -188,6 +195,21 @@ impl Files {
     /// Name of a file.
     pub(super) fn name(&self, number: usize) -> &str {
         self.entries.get(number).map_or("", |entry| &entry.name)
+    }
+
+    /// Name of a file for messages: with its zip, where there are several.
+    pub(super) fn shown(&self, number: usize) -> String {
+        match self.entries.get(number).map(|entry| &entry.place) {
+            Some(&Place::Zipped { zip, .. }) if self.zips.len() > 1 => {
+                format!("{}: {}", self.zips[zip].path.display(), self.name(number))
+            }
+            _ => self.name(number).to_owned(),
+        }
+    }
+
+    /// Whether a file lies in a zip.
+    pub(super) fn is_zipped(&self, number: usize) -> bool {
+        self.entries.get(number).is_some_and(|entry| matches!(entry.place, Place::Zipped { .. }))
     }
 
     /// The bytes of a file.
@@ -243,10 +265,25 @@ pub(super) fn regular(path: &Path) -> Result<fs::File> {
     })
 }
 
-/// Whether a file is a zip by its first bytes (an empty zip begins with its end record).
+/// Whether a file is a zip by its first bytes (an empty zip begins with its end record), or by its last ones where its
+/// name says that it may be one that unpacks itself.
 fn is_zip(path: &Path) -> Result<bool> {
     let head = read_head(path, 4)?;
-    Ok(head == *b"PK\x03\x04" || head == *b"PK\x05\x06")
+    if head == *b"PK\x03\x04" || head == *END_OF_ZIP {
+        return Ok(true);
+    }
+    let may_be =
+        ["zip", "exe"].iter().any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
+    if !may_be {
+        return Ok(false);
+    }
+    let failed = |error| Error::io("read", path, error);
+    let mut file = regular(path)?;
+    let length = file.metadata().map_err(failed)?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(LONGEST_END))).map_err(failed)?;
+    let mut tail = Vec::new();
+    file.take(LONGEST_END).read_to_end(&mut tail).map_err(failed)?;
+    Ok(tail.windows(END_OF_ZIP.len()).any(|part| part == END_OF_ZIP))
 }
 
 /// The first bytes of a file, fewer where it is shorter.

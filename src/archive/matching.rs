@@ -55,6 +55,8 @@ pub(super) struct Matcher<'a> {
     names: Vec<&'a str>,
     /// By the loosest form of the last part.
     by_stem: HashMap<String, Vec<usize>>,
+    /// Names for messages.
+    shown: &'a dyn Fn(usize) -> String,
 }
 
 /// A file that a list names.
@@ -72,14 +74,14 @@ pub(super) struct Match {
 }
 
 impl<'a> Matcher<'a> {
-    pub(super) fn new(names: impl Iterator<Item = &'a str>) -> Self {
+    pub(super) fn new(names: impl Iterator<Item = &'a str>, shown: &'a dyn Fn(usize) -> String) -> Self {
         let names: Vec<&str> = names.collect();
         let mut by_stem: HashMap<String, Vec<usize>> = HashMap::new();
         for (number, name) in names.iter().enumerate() {
             let last = parts(name).next_back().unwrap_or_default();
             by_stem.entry(at_level(last, LEVELS.len())).or_default().push(number);
         }
-        Self { names, by_stem }
+        Self { names, by_stem, shown }
     }
 
     /// The file that is meant by a list that lies in `folder`.
@@ -104,7 +106,7 @@ impl<'a> Matcher<'a> {
             return match self.meant(&found, listed, folder) {
                 Ok(number) => Ok(Match { number, differs }),
                 Err(several) => {
-                    let names: Vec<&str> = several.iter().map(|&number| self.names[number]).collect();
+                    let names: Vec<String> = several.iter().map(|&number| (self.shown)(number)).collect();
                     Err(Error::input(format!(
                         "lists {:?}, which is there {} times: {}",
                         listed.path,
@@ -149,7 +151,8 @@ mod tests {
     use super::*;
 
     fn found(names: &[&str], path: &str) -> std::result::Result<(String, Option<&'static str>), String> {
-        let matcher = Matcher::new(names.iter().copied());
+        let shown = |number: usize| names[number].to_owned();
+        let matcher = Matcher::new(names.iter().copied(), &shown);
         let file = path.rsplit('/').next().unwrap();
         let listed = Listed { file, path };
         let found = matcher.find(&listed, Path::new("set")).map_err(|error| error.to_string())?;

@@ -5,6 +5,7 @@
 
 pub mod adapt;
 mod catalogue;
+mod claims;
 mod container;
 mod files;
 #[cfg(feature = "hdf5")]
@@ -67,7 +68,7 @@ pub trait Source: Send + Sync {
         Reading::default()
     }
 
-    /// What a user should know of the archive that its samples do not depend on, a sentence each.
+    /// What only this kind of archive has to tell for [`notes`], a sentence each.
     fn notes(&self) -> Vec<String> {
         Vec::new()
     }
@@ -151,7 +152,13 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
         }
         None => Box::new(pictures::Pictures::open(paths, options, limits)?),
     };
+    claims::require_channels(source.contents()).map_err(|error| error.context(source.path().display()))?;
     adapt::adapt(source, reading)
+}
+
+/// What a user should know of an archive that its samples do not depend on, a sentence each.
+pub fn notes(source: &dyn Source) -> Vec<String> {
+    source.notes().into_iter().chain(claims::near_directions(source.contents())).collect()
 }
 
 /// The bytes of a small file beside an archive: a list, a table.

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::picture::{self, DecodeOptions};
+use btfkit_formats::picture::{self, DecodeOptions, PictureHeader};
 use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
 use rayon::prelude::*;
 
@@ -22,11 +22,13 @@ pub(super) struct Pictures {
     files: Files,
     /// File of each image, [view, light].
     images: Vec<usize>,
-    /// Files that are no images.
-    ignored: usize,
+    /// What to know of the files that are no images.
+    notes: Vec<String>,
     contents: Contents,
     /// What the first picture asks for; no picture is turned.
     orientation: u8,
+    /// What the first picture says of its colours; nothing of it is applied.
+    profile: Option<String>,
     decoding: DecodeOptions,
     limits: Limits,
 }
@@ -48,6 +50,12 @@ impl Pictures {
         if !header.linear {
             assumptions.push("the pictures' transfer curve is sRGB".to_owned());
         }
+        if let Some(profile) = &header.profile {
+            let taken = if header.linear { "proportional to reflectance" } else { "sRGB" };
+            assumptions.push(format!(
+                "{profile}, which the pictures state, is not applied: samples are taken as {taken}"
+            ));
+        }
         if header.scanlines_are_columns {
             assumptions.push(format!("scan lines that are columns: read as {:?}", options.hdr_orientation));
         }
@@ -64,7 +72,7 @@ impl Pictures {
             format,
             width: header.width,
             height: header.height,
-            channels: header.channels,
+            channels: header.channels.clone(),
             sample_type: header.sample_type,
             views,
             lights,
@@ -74,8 +82,9 @@ impl Pictures {
             remarks: Vec::new(),
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
-        let (orientation, ignored) = (header.orientation, catalogue.ignored() + files.hidden());
-        Ok(Self { path, files, images, ignored, contents, orientation, decoding, limits })
+        let notes = notes_of(&files, &images, catalogue.ignored() + files.hidden());
+        let PictureHeader { orientation, profile, .. } = header;
+        Ok(Self { path, files, images, notes, contents, orientation, profile, decoding, limits })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -96,6 +105,17 @@ impl Pictures {
                 self.files.name(file),
                 found.orientation,
                 self.orientation
+            )));
+        }
+        if found.profile != self.profile {
+            let told =
+                |profile: &Option<String>| profile.clone().unwrap_or_else(|| "sRGB or nothing".to_owned());
+            return Err(Error::input(format!(
+                "{}: states {} for its colours, expected {} like the first image; profiles are not applied, so convert \
+                 all pictures to one",
+                self.files.name(file),
+                told(&found.profile),
+                told(&self.profile)
             )));
         }
         Ok(checksum)
@@ -141,10 +161,7 @@ impl Source for Pictures {
     }
 
     fn notes(&self) -> Vec<String> {
-        match self.ignored {
-            0 => Vec::new(),
-            count => vec![format!("{count} other files are ignored")],
-        }
+        self.notes.clone()
     }
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
@@ -186,6 +203,14 @@ impl Source for Pictures {
         let checksums: Vec<u8> = checked.into_iter().flatten().flat_map(u32::to_le_bytes).collect();
         Ok(recipe::digest_bytes(&checksums))
     }
+}
+
+/// How many files are no images, and which of them are pictures.
+fn notes_of(files: &Files, images: &[usize], ignored: usize) -> Vec<String> {
+    let mut left = vec![true; files.len()];
+    images.iter().for_each(|&number| left[number] = false);
+    let count = (ignored > 0).then(|| format!("{ignored} other files are ignored"));
+    count.into_iter().chain(catalogue::left_out(files, left.into_iter())).collect()
 }
 
 /// One error that names all problems.

@@ -126,7 +126,7 @@ impl Import {
         }
         let report = plan.run(context)?;
         let assumed = source.contents().assumptions.iter().map(|text| format!("assumed: {text}"));
-        let remarks = source.notes().into_iter().chain(assumed).collect();
+        let remarks = btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).collect();
         Ok(Some((plan.description().clone(), report, remarks)))
     }
 

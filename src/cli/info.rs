@@ -109,7 +109,7 @@ impl Info {
             samples: Samples::of(&import::describe(source.as_ref(), 1.0)),
             store_bytes: [Chain::Stock, Chain::Predictive].into_iter().map(bytes).collect::<Result<_>>()?,
             remarks: contents.remarks.clone(),
-            notes: source.notes(),
+            notes: btfkit::archive::notes(source.as_ref()),
             assumptions: contents.assumptions.clone(),
         })))
     }

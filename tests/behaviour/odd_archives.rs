@@ -13,13 +13,13 @@ use tempfile::TempDir;
 use crate::fixture::{btf, fail, succeed};
 
 /// A grey picture of one value.
-fn png(value: u8) -> Vec<u8> {
+pub(crate) fn png(value: u8) -> Vec<u8> {
     let samples = Samples::U8(vec![value; 64]);
     picture::png::encode(&Picture { width: 8, height: 8, channels: vec!["Y".to_owned()], samples }).unwrap()
 }
 
 /// A folder of files, and the folder that holds it.
-fn set(files: &[(&str, Vec<u8>)]) -> (TempDir, PathBuf) {
+pub(crate) fn set(files: &[(&str, Vec<u8>)]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path().join("set");
     for (name, bytes) in files {
@@ -31,12 +31,12 @@ fn set(files: &[(&str, Vec<u8>)]) -> (TempDir, PathBuf) {
 }
 
 /// Three pictures of the values 10, 20, 30, by these names.
-fn three(names: [&str; 3]) -> Vec<(&str, Vec<u8>)> {
+pub(crate) fn three(names: [&str; 3]) -> Vec<(&str, Vec<u8>)> {
     names.into_iter().zip([10, 20, 30]).map(|(name, value)| (name, png(value))).collect()
 }
 
 /// The azimuth of the light under which each value was taken, whole degrees.
-fn azimuths(archive: &Path) -> Vec<(u8, i64)> {
+pub(crate) fn azimuths(archive: &Path) -> Vec<(u8, i64)> {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path().join("s.zarr");
     succeed(btf().arg("import").args([archive, &store]));
@@ -52,18 +52,18 @@ fn azimuths(archive: &Path) -> Vec<(u8, i64)> {
     found
 }
 
-const RIGHT: [(u8, i64); 3] = [(10, 0), (20, 90), (30, 180)];
+pub(crate) const RIGHT: [(u8, i64); 3] = [(10, 0), (20, 90), (30, 180)];
 
 /// A light list of three names whose lights are at 0, 90 and 180 degrees.
-fn list(names: [&str; 3]) -> String {
+pub(crate) fn list(names: [&str; 3]) -> String {
     format!("3\n{} 1 0 1\n{} 0 1 1\n{} -1 0 1\n", names[0], names[1], names[2])
 }
 
-fn told(archive: &Path) -> String {
+pub(crate) fn told(archive: &Path) -> String {
     succeed(btf().arg("info").arg(archive))
 }
 
-fn refused(archive: &Path) -> String {
+pub(crate) fn refused(archive: &Path) -> String {
     let folder = tempfile::tempdir().unwrap();
     fail(btf().arg("import").arg(archive).arg(folder.path().join("s.zarr")), 65)
 }

@@ -10,7 +10,7 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::frame::Arrangement;
 use super::interleave::interleaved;
-use super::structure;
+use super::structure::{self, Walked};
 use crate::{Error, Limits, Result};
 
 /// A decoded image.
@@ -37,11 +37,11 @@ pub struct Image {
 ///   modes, other than 8 bits, other than 1 or 3 components, unusual sampling factors.
 /// - [`ErrorKind::Limit`](crate::ErrorKind::Limit): more pixels or scans than `limits` allows.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
-    let structure::Walked { header, arrangement, length, not_adobe } = structure::walk(bytes, limits)?;
-    let picture = bytes.get(..length).unwrap_or(bytes);
-    let picture = without_names(picture, &not_adobe);
+    let walked = structure::walk(bytes, limits)?;
+    let picture = with_colours(bytes.get(..walked.length).unwrap_or(bytes), &walked);
     let picture = picture.as_ref();
-    let bytes: Cow<'_, [u8]> = match arrangement {
+    let header = walked.header;
+    let bytes: Cow<'_, [u8]> = match walked.arrangement {
         Arrangement::Ordinary => Cow::Borrowed(picture),
         Arrangement::OneComponent(at) => {
             let mut plain = picture.to_vec();
@@ -50,7 +50,14 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
             }
             Cow::Owned(plain)
         }
-        Arrangement::ScatteredScans(grid) => Cow::Owned(interleaved(picture, &grid)?),
+        Arrangement::ScatteredScans(mut grid) => {
+            if let Some((id, _)) =
+                grid.components.first_mut().filter(|_| !walked.rgb && !walked.red_ids.is_empty())
+            {
+                *id = NO_RED;
+            }
+            Cow::Owned(interleaved(picture, &grid)?)
+        }
     };
     let colours = if header.channels == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
     let options = DecoderOptions::default()
@@ -73,16 +80,30 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     Ok(Image { width: header.width, height: header.height, channels: header.channels, samples })
 }
 
-/// The picture with the segments whose names begin at these bytes made segments of no name, which decoders step over.
-fn without_names<'a>(picture: &'a [u8], names: &[usize]) -> Cow<'a, [u8]> {
-    if names.is_empty() {
+/// An Adobe segment that says of three components that they are red, green and blue.
+const ADOBE_RGB: &[u8] = b"\xFF\xEE\0\x0EAdobe\0\x64\0\0\0\0\0";
+
+/// The id that R becomes where it is none of red.
+const NO_RED: u8 = b'Y';
+
+/// The picture with no more than one word about what its components are, that which counts: Adobe segments become ones
+/// of no name, which decoders step over, ids that say RGB of what is YCbCr say it no longer, and RGB gets a segment of
+/// our own.
+fn with_colours<'a>(picture: &'a [u8], walked: &Walked) -> Cow<'a, [u8]> {
+    let Walked { adobe, red_ids, rgb, .. } = walked;
+    if adobe.is_empty() && red_ids.is_empty() && !rgb {
         return Cow::Borrowed(picture);
     }
     let mut plain = picture.to_vec();
-    for &at in names {
-        if let Some(letter) = plain.get_mut(at) {
-            *letter = 0;
+    let names = adobe.iter().map(|&at| (at, 0));
+    let ids = red_ids.iter().map(|&at| (at, NO_RED)).filter(|_| !rgb);
+    for (at, byte) in names.chain(ids) {
+        if let Some(place) = plain.get_mut(at) {
+            *place = byte;
         }
+    }
+    if *rgb && plain.len() > 2 {
+        plain.splice(2..2, ADOBE_RGB.iter().copied());
     }
     Cow::Owned(plain)
 }

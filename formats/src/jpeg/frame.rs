@@ -100,7 +100,7 @@ pub(super) struct Frame {
     horizontal_max: u8,
     vertical_max: u8,
     /// Where the sampling factors of the first component stand.
-    sampling_at: usize,
+    pub(super) sampling_at: usize,
     scans: usize,
 }
 
@@ -307,6 +307,11 @@ impl Frame {
         let units = columns.saturating_mul(height.div_ceil(v_max.saturating_mul(8)));
         let per_unit = components.map(Component::blocks_per_mcu).fold(0, u64::saturating_add);
         (units, units.saturating_mul(per_unit))
+    }
+
+    /// The components' ids, in their order.
+    pub(super) fn ids(&self) -> impl Iterator<Item = u8> {
+        self.components.iter().map(|component| component.id)
     }
 
     /// Refuses a frame whose end, at byte `at`, comes before all of its coefficients have.

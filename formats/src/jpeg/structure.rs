@@ -13,9 +13,12 @@ pub(super) struct Walked {
     pub(super) arrangement: Arrangement,
     /// Bytes up to the end marker, with it.
     pub(super) length: usize,
-    /// Where the names of Adobe segments stand that must not count: all in a file that is JFIF, and so YCbCr (T.871,
-    /// 6.1), in either order of the two, and those behind the first scan; as libjpeg and all that is built on it have it.
-    pub(super) not_adobe: Vec<usize>,
+    /// Where the names of all Adobe segments stand. Decoders judge by them in ways of their own; `rgb` is what counts.
+    pub(super) adobe: Vec<usize>,
+    /// Three components that are red, green and blue and not YCbCr, as libjpeg and all that is built on it have it.
+    pub(super) rgb: bool,
+    /// Where the id R of the first component stands, in the frame header and in those of scans.
+    pub(super) red_ids: Vec<usize>,
 }
 
 /// Reads as far as the frame header.
@@ -48,7 +51,8 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut restart_interval = 0;
     let mut scans = 0u32;
     let mut orientation = 1;
-    let (mut is_jfif, mut adobe) = (false, Vec::new());
+    let (mut is_jfif, mut adobe, mut transform) = (false, Vec::new(), None);
+    let mut red_ids = Vec::new();
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
@@ -56,7 +60,9 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                 if frame.is_some() {
                     return Err(Error::malformed("a second frame header", "one").at(at));
                 }
-                frame = Some(Frame::read(&mut reader, code == marker::SOF2, limits)?);
+                let read = Frame::read(&mut reader, code == marker::SOF2, limits)?;
+                red_ids.extend(read.sampling_at.checked_sub(1).filter(|_| read.ids().eq(*b"RGB")));
+                frame = Some(read);
             }
             marker::DRI => restart_interval = read_restart_interval(&mut reader)?,
             marker::APP1 if frame.is_none() => orientation = read_orientation(&mut reader, orientation)?,
@@ -64,8 +70,10 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
             marker::APP0 if scans == 0 => is_jfif |= is_jfif_segment(marker::segment(&mut reader)?),
             marker::APP14 => {
                 let name = reader.position().saturating_add(2);
-                if marker::segment(&mut reader)?.starts_with(b"Adobe") {
-                    adobe.push((name, scans > 0));
+                let segment = marker::segment(&mut reader)?;
+                if segment.starts_with(b"Adobe") {
+                    adobe.push(name);
+                    transform = segment.get(11).copied().filter(|_| scans == 0).or(transform);
                 }
             }
             marker::SOS => {
@@ -79,7 +87,13 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                 let Some(frame) = frame.as_mut() else {
                     return Err(Error::malformed("a scan", "a frame header (SOF) before it").at(at));
                 };
+                let header_at = reader.position();
                 frame.read_scan(&mut reader, restart_interval)?;
+                if !red_ids.is_empty() {
+                    // Components of a scan stand in the order of the frame.
+                    let first = header_at.saturating_add(3);
+                    red_ids.extend(Some(first).filter(|&at| bytes.get(at) == Some(&b'R')));
+                }
             }
             marker::EOI => {
                 let Some(frame) = frame else {
@@ -90,11 +104,9 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                     header: Header { orientation, ..frame.header },
                     arrangement: frame.arrangement(),
                     length: reader.position(),
-                    not_adobe: adobe
-                        .iter()
-                        .filter(|(_, late)| is_jfif || *late)
-                        .map(|(name, _)| *name)
-                        .collect(),
+                    adobe,
+                    rgb: frame.header.channels == 3 && is_rgb(is_jfif, transform, frame.ids()),
+                    red_ids,
                 });
             }
             code => skip(&mut reader, code, at)?,
@@ -128,16 +140,25 @@ fn skip(reader: &mut Reader<'_>, code: u8, at: usize) -> Result<()> {
     }
 }
 
+/// Whether three components are red, green and blue: a file that is JFIF is YCbCr (T.871, 6.1) whatever stands in it,
+/// else an Adobe segment says it, else the components' ids do. (Other ids and transforms are taken for YCbCr.)
+fn is_rgb(is_jfif: bool, adobe_transform: Option<u8>, ids: impl Iterator<Item = u8>) -> bool {
+    match adobe_transform {
+        _ if is_jfif => false,
+        Some(transform) => transform == 0,
+        None => ids.eq(*b"RGB"),
+    }
+}
+
 /// As libjpeg knows one: the name, and room for what it must hold.
 fn is_jfif_segment(segment: &[u8]) -> bool {
     segment.starts_with(b"JFIF\0") && segment.len() >= 14
 }
 
-/// The orientation in an Exif segment; the first one that is found counts.
+/// The orientation in a segment of Exif or XMP data; the first one that is found counts.
 fn read_orientation(reader: &mut Reader<'_>, before: u8) -> Result<u8> {
     let segment = marker::segment(reader)?;
-    let found = segment.strip_prefix(b"Exif\0\0").map_or(1, orientation::of_exif);
-    Ok(if before == 1 { found } else { before })
+    Ok(if before == 1 { orientation::of_segment(segment) } else { before })
 }
 
 fn read_restart_interval(reader: &mut Reader<'_>) -> Result<u64> {

@@ -103,7 +103,12 @@ impl Labels {
         if alone.as_ref().is_some_and(Pattern::has_view) {
             return alone;
         }
-        let folder = stem.rsplit_once(['/', '\\']).and_then(|(above, _)| self.fields_of(base(above)));
+        let above = stem.rsplit_once(['/', '\\']).map(|(above, _)| base(above));
+        let folder = above.and_then(|above| self.fields_of(above));
+        // A folder with labels whose numbers cannot be read is not passed over.
+        if folder.is_none() && above.is_some_and(|above| !above.contains(['{', '}'])) {
+            return None;
+        }
         let both = folder.and_then(|folder| parse(&format!("{folder}/{file}")));
         both.filter(Pattern::has_view).or(alone)
     }
@@ -270,6 +275,19 @@ mod tests {
             ("l15_30p5_v0_0.png", ""),
             ("l15,5_30_v0_0.png", ""),
             ("{tl15_pl30}.png", ""),
+            ("tl7d5_pl0.png", ""),
+            ("tl7\u{66b}5_pl0.png", ""),
+            ("{wool}/tl15_pl30.png", "tl{theta_i}_pl{phi_i}"),
+            ("wool 7,5/tl15_pl30.png", "tl{theta_i}_pl{phi_i}"),
+            ("tv7.5_pv22.5/tl15_pl30.png", "tv{theta_v}_pv{phi_v}/tl{theta_i}_pl{phi_i}"),
+            ("tv7,5_pv22,5/tl15_pl30.png", ""),
+            ("tv7_pv22,5/tl15_pl30.png", ""),
+            ("tv7p5_pv22/tl15_pl30.png", ""),
+            ("tv7\u{66b}5_pv22/tl15_pl30.png", ""),
+            ("tv7_5_pv22/tl15_pl30.png", ""),
+            ("a\\tv7,5_pv22\\tl15_pl30.png", ""),
+            ("view_7,5_20/light_30_40.png", ""),
+            ("view_7_20,5/light_30_40.png", ""),
         ] {
             let found = recognise([name]).map(|pattern| pattern.to_string()).unwrap_or_default();
             assert_eq!(found, pattern, "{name}");

@@ -67,7 +67,8 @@ impl Archive {
     /// # Errors
     /// [`ErrorKind::Malformed`]: a damaged header, or other data than the shape says. [`ErrorKind::Unsupported`]: another type or
     /// number of axes, Fortran order. [`ErrorKind::Limit`]: sizes beyond the limits. [`ErrorKind::Argument`]:
-    /// directions that are missing, too few or many, double, or point into the surface.
+    /// directions that are missing. [`ErrorKind::Malformed`] also: directions that are too few or many, double, or point into
+    /// the surface; too few or many names of channels.
     pub fn open(bytes: &[u8], beside: Beside, limits: &Limits) -> Result<Archive> {
         let header = Header::read(bytes)?;
         let [views, lights, height, width, channels] = header.shape[..] else {
@@ -199,7 +200,7 @@ fn named(count: u64, given: Option<Vec<String>>) -> Result<Vec<String>> {
         return Ok(names);
     }
     let found = format!("{} names of channels in NAME.channels.txt", names.len());
-    Err(Error::new(ErrorKind::Argument, found, format!("{count} as in the array")))
+    Err(Error::malformed(found, format!("{count} as in the array; mend that file, or move it away")))
 }
 
 fn channel_names(count: u64) -> Vec<String> {
@@ -212,18 +213,22 @@ fn channel_names(count: u64) -> Vec<String> {
 
 /// The directions of one axis, as many as the axis is long and no two alike.
 fn checked(axis: &str, count: u64, given: Option<Vec<Direction>>) -> Result<Vec<Direction>> {
-    let wrong = |found: String, expected: String| Err(Error::new(ErrorKind::Argument, found, expected));
+    let wrong = |found: String, expected: String| Err(Error::malformed(found, expected));
     let Some(list) = given else {
         let published = usize::try_from(count).ok().and_then(published_name);
         let published =
             published.map(|name| format!(", or the published list {name} named")).unwrap_or_default();
         let expected =
             format!("the directions of the {axis} beside the array, in NAME.{axis}.npy{published}");
-        return wrong(format!("{count} {axis} without directions"), expected);
+        let found = format!("{count} {axis} without directions");
+        return Err(Error::new(ErrorKind::Argument, found, expected));
     };
     if u64::try_from(list.len()).ok() != Some(count) {
         let found = format!("{} directions of {axis} beside the array", list.len());
-        return wrong(found, format!("{count} as in the array"));
+        return wrong(
+            found,
+            format!("{count} as in the array, of NAME.{axis}.npy or the list that was named"),
+        );
     }
     let angles: Option<Vec<Angles>> = list.iter().copied().map(Angles::from_direction).collect();
     let Some(angles) = angles else {

@@ -54,6 +54,7 @@ fn of_header(header: &Header) -> PictureHeader {
         linear: true,
         scanlines_are_columns: false,
         orientation: 1,
+        profile: None,
         layer: header.channels.layer.clone(),
     }
 }

@@ -3,6 +3,7 @@
 //! Not applied: `gAMA`, `cHRM`, `sRGB`, `iCCP`, `sBIT`. Refused: animations.
 
 mod chunks;
+mod said;
 
 use std::io::Cursor;
 
@@ -15,16 +16,18 @@ use super::{Picture, PictureHeader, grey_or_rgb};
 use crate::{Error, ErrorKind, Limits, Result, Samples};
 
 pub(super) use chunks::SIGNATURE;
+use said::Said;
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
-    Ok(of_image(&chunks::header(bytes, limits)?))
+    Ok(of_image(&chunks::header(bytes, limits)?, bytes))
 }
 
 pub(super) fn check(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
-    Ok(of_image(&chunks::walk(bytes, limits)?.image))
+    Ok(of_image(&chunks::walk(bytes, limits)?.image, bytes))
 }
 
-fn of_image(image: &chunks::ImageHeader) -> PictureHeader {
+fn of_image(image: &chunks::ImageHeader, bytes: &[u8]) -> PictureHeader {
+    let said = Said::of(bytes);
     PictureHeader {
         width: image.width,
         height: image.height,
@@ -32,7 +35,8 @@ fn of_image(image: &chunks::ImageHeader) -> PictureHeader {
         sample_type: image.sample_type,
         linear: false,
         scanlines_are_columns: false,
-        orientation: image.orientation,
+        orientation: said.orientation(),
+        profile: said.profile(),
         layer: None,
     }
 }

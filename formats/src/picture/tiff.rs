@@ -43,6 +43,15 @@ pub(super) fn orientation(bytes: &[u8]) -> Result<u64> {
     Directory::first(bytes)?.number(tag::ORIENTATION, Some(1))
 }
 
+/// The colour space that Exif data state (tag 40961 in the directory that tag 34665 leads to).
+pub(super) fn exif_colour_space(bytes: &[u8]) -> Result<Option<u64>> {
+    let first = Directory::first(bytes)?;
+    let Some(offset) = first.list(tag::EXIF_IFD)?.and_then(|list| list.first().copied()) else {
+        return Ok(None);
+    };
+    Ok(first.sibling(offset)?.list(tag::COLOUR_SPACE)?.and_then(|list| list.first().copied()))
+}
+
 fn of_layout(layout: &Layout) -> PictureHeader {
     PictureHeader {
         width: layout.size.width,
@@ -52,6 +61,7 @@ fn of_layout(layout: &Layout) -> PictureHeader {
         linear: matches!(layout.sample_type, SampleType::F16 | SampleType::F32),
         scanlines_are_columns: false,
         orientation: layout.orientation,
+        profile: layout.profile.clone(),
         layer: None,
     }
 }

@@ -35,12 +35,13 @@ pub struct Lamp {
 /// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y
 /// z, the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by
 /// spaces or tabs, lines end in LF, CRLF or CR. The text is UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal
-/// point or, all of them that have a fraction, a decimal comma. A count that is wrong or not there is a warning. A second
-/// variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another
+/// point or, all of them that have a fraction, a decimal comma. A name may be quoted. A count that is not there is a
+/// warning; one that is wrong is an error, as it tells of a list that is cut, or put together of two, which nothing else
+/// does. A second variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another
 /// machine) the last part counts, so a list never reaches out of its folder.
 ///
 /// # Errors
-/// [`ErrorKind::Malformed`], with the line: no light at all, a line that is none, a vector of no length or into the
+/// [`ErrorKind::Malformed`], with the line: no light at all, another number of them than the first line says, a line that is none, a vector of no length or into the
 /// surface, names on some lines only, no usable name, a name twice. [`ErrorKind::Limit`]: more lights than
 /// [`Limits::max_directions`].
 pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
@@ -55,7 +56,7 @@ pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
             continue;
         }
         if lamps.is_empty() && count.is_none() && text.bytes().all(|byte| byte.is_ascii_digit()) {
-            count = Some(text.to_owned());
+            count = Some((text.to_owned(), number));
             continue;
         }
         if u64::try_from(lamps.len()).unwrap_or(u64::MAX) >= limits.max_directions {
@@ -84,7 +85,8 @@ pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
         let found = format!("line {again}: {file:?} again, which is in line {first}");
         return Err(Error::malformed(found, "every file once"));
     }
-    let warnings = warning(count.as_deref(), lamps.len()).into_iter().collect();
+    let last = lamps.last().map_or(0, |lamp| lamp.line);
+    let warnings = require_count(count.as_ref(), lamps.len(), last)?.into_iter().collect();
     Ok(LightList { lamps, warnings })
 }
 
@@ -142,6 +144,7 @@ fn lamp(text: &str, line: usize, marks: &mut Marks) -> Result<Lamp> {
         return Ok(Lamp { file: None, path: String::new(), light, line });
     }
     // Names in another encoding than UTF-8 are of no use, but their folders do not matter.
+    let name = unquoted(name);
     match inside_folder(name).filter(|file| !file.contains(char::REPLACEMENT_CHARACTER)) {
         Some(file) => Ok(Lamp { file: Some(file), path: parts_of(name), light, line }),
         None => {
@@ -174,12 +177,22 @@ impl Marks {
     }
 }
 
-fn warning(count: Option<&str>, lights: usize) -> Option<String> {
+/// The number in the list's first line is that of its lights; without one, what to know of it.
+fn require_count(count: Option<&(String, usize)>, lights: usize, last: usize) -> Result<Option<String>> {
     match count {
-        None => Some(format!("the list does not begin with its number of lights; it has {lights}")),
-        Some(count) if count.parse() == Ok(lights) => None,
-        Some(count) => Some(format!("the list says that it has {count} lights, it has {lights}")),
+        None => Ok(Some(format!("the list does not begin with its number of lights; it has {lights}"))),
+        Some((count, _)) if count.parse() == Ok(lights) => Ok(None),
+        Some((count, line)) => Err(Error::malformed(
+            format!("line {line} says that there are {count} lights, up to line {last} there are {lights}"),
+            "as many; the list is cut or put together of others, or else mend its count",
+        )),
     }
+}
+
+/// A name without the quotes that a spreadsheet puts around one with blanks.
+fn unquoted(name: &str) -> &str {
+    let within = |quote| name.strip_prefix(quote).and_then(|name| name.strip_suffix(quote));
+    within('"').or_else(|| within('\'')).unwrap_or(name)
 }
 
 #[cfg(test)]
@@ -215,12 +228,51 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_or_missing_count_is_a_warning() {
-        assert_eq!(list("7\na.png 0 0 1\n").warnings.len(), 1);
-        assert!(list("7\na.png 0 0 1\n").warnings[0].contains("says that it has 7 lights, it has 1"));
-        assert!(list("99999999999999999999999\na.png 0 0 1\n").warnings[0].contains("it has 1"));
+    fn a_missing_count_is_a_warning_and_a_wrong_one_an_error() {
         assert!(list("\u{feff}a.png 0 0 1\nb.png 0 1 1").warnings[0].contains("it has 2"));
         assert!(list("\u{feff}2\na.png 0 0 1\nb.png 0 1 1").warnings.is_empty());
+        assert!(list("\n 002 \na.png 0 0 1\nb.png 0 1 1").warnings.is_empty());
+        for (text, words) in [
+            ("7\na.png 0 0 1\n", "line 1 says that there are 7 lights, up to line 2 there are 1"),
+            (
+                "\n1\na.png 0 0 1\n\nb.png 0 1 1",
+                "line 2 says that there are 1 lights, up to line 5 there are 2",
+            ),
+            ("0\na.png 0 0 1\n", "are 0 lights"),
+            ("3\n0 0 1\n0 1 1\n", "are 3 lights"),
+            ("99999999999999999999999\na.png 0 0 1\n", "there are 1"),
+        ] {
+            let error = read_lp(text.as_bytes(), &Limits::default()).unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn quotes_and_the_end_mark_of_dos_belong_to_nothing() {
+        let plain = list("2\na b.png 0 0 1\nc.png 0 1 1\n");
+        assert_eq!(list("2\n\"a b.png\" 0 0 1\n'c.png'\t0 1 1\n\x1A"), plain);
+        assert_eq!(list("2\na b.png 0 0 1\nc.png 0 1 1\x1A"), plain);
+    }
+
+    #[test]
+    fn other_separators_and_comments_are_refused_by_line() {
+        for line in [
+            "a.png;0.1;0.2;0.9",
+            "a.png; 0.1; 0.2; 0.9",
+            "a.png,0.1,0.2,0.9",
+            "a.png 0;1;1",
+            "a.png 0,1,1",
+            "\"a.png\",0,0,1",
+            "# lights of the dome",
+            "// x y z",
+            "a.png 0\u{66b}5 0 1",
+            "a.png 0d5 0 1",
+            "a.png 0 0 1 # top",
+            "a.png 0 0 1\x1A\nb.png 0 0 1",
+        ] {
+            let error = read_lp(format!("1\n{line}\n").as_bytes(), &Limits::default()).unwrap_err();
+            assert!(error.to_string().contains("line 2: "), "{line}: {error}");
+        }
     }
 
     #[test]
@@ -290,7 +342,8 @@ mod tests {
     #[test]
     fn lights_are_limited() {
         let limits = Limits { max_directions: 1, ..Limits::default() };
-        assert!(read_lp(b"4000000000\na 0 0 1\n", &limits).is_ok());
+        let error = read_lp(b"4000000000\na 0 0 1\n", &limits).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Malformed);
         let error = read_lp(b"2\na 0 0 1\nb 0 1 1\n", &limits).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::Limit);
     }

@@ -196,6 +196,8 @@ mod tests {
             "tl7-5_pl0_tv22-5_pv90.jpg",
             "tl7_5_pl0_tv22_5_pv90.jpg",
             "tl4.5e+01_pl0_tv22_pv90.jpg",
+            "tl7d5_pl0_tv22d5_pv90.jpg",
+            "tl7\u{66b}5_pl0_tv22_pv90.jpg",
         ] {
             assert_eq!(parse_name(name), None, "{name:?}");
         }
@@ -203,7 +205,12 @@ mod tests {
 
     #[test]
     fn names_that_would_be_read_by_half() {
-        for name in ["a/tl7,5_pl0_tv22,5_pv90.jpg", "tl7_pl0_tv22_pv90_5.png", "tl7 pl0 tv2 5 pv90.png"] {
+        for name in [
+            "a/tl7,5_pl0_tv22,5_pv90.jpg",
+            "tl7_pl0_tv22_pv90_5.png",
+            "tl7 pl0 tv2 5 pv90.png",
+            "tl7d5 pl0 tv2 pv90.png",
+        ] {
             assert!(half_read(name), "{name:?}");
         }
         for name in

@@ -182,6 +182,33 @@ fn a_jfif_file_is_ycbcr_whatever_an_adobe_segment_says() {
             assert!((f64::from(rgb[0]) - luminance).abs() < 16.0, "{rgb:?} {expected:?}");
         }
         assert_ne!(rgb, expected);
+        // What no other word is spoken of, the ids say; libjpeg takes other ids and transforms for YCbCr.
+        let named = |ids: &[u8; 3], parts: &[&[u8]]| {
+            let mut bytes = [parts, &[rest]].concat().concat();
+            let frame = after_marker(&bytes, if progressive { 0xC2 } else { 0xC0 }, 0);
+            let old: Vec<u8> = (0..3).map(|n| bytes[frame + 8 + 3 * n]).collect();
+            (0..3).for_each(|n| bytes[frame + 8 + 3 * n] = ids[n]);
+            let mut at = frame;
+            while let Some(found) = bytes[at..].windows(2).position(|pair| pair == [0xFF, 0xDA]) {
+                at += found + 4;
+                for n in 0..usize::from(bytes[at]) {
+                    let place = at + 1 + 2 * n;
+                    bytes[place] = ids[old.iter().position(|&id| id == bytes[place]).unwrap()];
+                }
+            }
+            samples(&bytes)
+        };
+        assert_eq!(named(b"RGB", &[start]), rgb);
+        assert_eq!(named(b"RGB", &[start, jfif]), expected);
+        assert_eq!(named(b"RGB", &[start, &adobe(1)]), expected);
+        assert_eq!(named(b"RGB", &[start, &adobe(0)]), rgb);
+        assert_eq!(named(b"\x01\x02\x03", &[start, &adobe(0), &adobe(1)]), expected, "the last one counts");
+        for ids in [b"rgb", b"\0\x01\x02", b"BGR", b"YUV"] {
+            assert_eq!(named(ids, &[start]), expected, "{ids:?}");
+        }
+        for transform in [2, 3, 255] {
+            assert_eq!(named(b"\x01\x02\x03", &[start, &adobe(transform)]), expected);
+        }
         if progressive {
             let end = after_marker(&plain, 0xDA, 1) - 2;
             let late = [start, &plain[20..end], &adobe(0), &plain[end..]].concat();

@@ -234,6 +234,39 @@ fn scans_in_any_arrangement_are_the_picture_interleaved() {
     }
 }
 
+/// The same file with the ids R, G and B.
+fn named_rgb(plain: &[u8]) -> Vec<u8> {
+    let mut bytes = plain.to_vec();
+    let after = |code: u8| {
+        let markers = plain.windows(2).enumerate().filter(move |(_, pair)| *pair == [0xFF, code]);
+        markers.map(|(at, _)| at + 4)
+    };
+    let frame = after(0xC0).next().unwrap();
+    let scans = after(0xDA).flat_map(|at| (0..usize::from(plain[at])).map(move |n| at + 1 + 2 * n));
+    for at in (0..3).map(|n| frame + 6 + 3 * n).chain(scans) {
+        bytes[at] = b"RGB"[usize::from(plain[at]) - 1];
+    }
+    bytes
+}
+
+#[test]
+fn ids_of_colours_count_where_no_segment_does_however_scans_are_arranged() {
+    let picture = Coefficients::new(17, 9, &[(1, 1); 3]);
+    let insert = |bytes: &[u8], segment: &[u8]| [&bytes[..2], segment, &bytes[2..]].concat();
+    let jfif = b"\xFF\xE0\0\x10JFIF\0\x01\x01\0\0\x01\0\x01\0\0";
+    let adobe = |transform: u8| [b"\xFF\xEE\0\x0EAdobe\0\x64\0\0\0\0", &[transform][..]].concat();
+    for scans in [&[&[0, 1, 2][..]][..], &[&[0], &[1], &[2]], &[&[0, 1], &[2]], &[&[1, 2], &[0]]] {
+        let plain = picture.written(scans, 0);
+        let named = named_rgb(&plain);
+        let (ycbcr, rgb) = (samples(&plain), samples(&insert(&plain, &adobe(0))));
+        assert_ne!(ycbcr, rgb);
+        assert_eq!(samples(&named), rgb, "{scans:?}");
+        assert_eq!(samples(&insert(&named, jfif)), ycbcr, "{scans:?}");
+        assert_eq!(samples(&insert(&named, &adobe(1))), ycbcr, "{scans:?}");
+        assert_eq!(samples(&insert(&insert(&named, &adobe(0)), jfif)), ycbcr, "{scans:?}");
+    }
+}
+
 #[test]
 fn factors_that_all_components_share_mean_nothing() {
     for (width, height) in SIZES {

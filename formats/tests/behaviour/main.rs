@@ -29,6 +29,7 @@ mod picture_exr;
 mod picture_files;
 mod picture_hdr;
 mod picture_png;
+mod picture_said;
 mod picture_tiff;
 mod support;
 mod utia_files;

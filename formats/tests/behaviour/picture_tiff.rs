@@ -221,11 +221,18 @@ fn the_picture_is_the_one_that_is_no_smaller_version() {
         // A camera's: a thumbnail, the picture below it, perhaps with a preview.
         (vec![part(3, small, false), part(9, full, true)], 9),
         (vec![part(3, small, false), part(5, small, true), part(9, full, true)], 9),
-        // Smaller versions below the picture.
+        (vec![part(3, &[(254, 1), (274, 6)], false), part(9, full, true)], 9),
+        // Smaller versions below the picture, which need not say that they are.
+        (vec![part(9, full, false), part(5, full, true), part(3, full, true)], 9),
+        (vec![part(9, full, false), part(9, small, true)], 9),
         (vec![part(9, full, false), part(5, small, true), part(3, small, true)], 9),
     ] {
         let bytes = file_of(&parts);
-        assert_eq!(header(&bytes, &Limits::default()).unwrap().width, side);
+        let found = header(&bytes, &Limits::default()).unwrap();
+        assert_eq!(found.width, side);
+        // A camera states the turn where its thumbnail is.
+        let turned = parts.iter().any(|part| part.tags.contains(&(274, 6)));
+        assert_eq!(found.orientation, if turned { 6 } else { 1 });
         check(&bytes, &Limits::default()).unwrap();
         assert_eq!(read(&bytes).samples, Samples::U8(vec![9; 81]));
     }
@@ -234,6 +241,14 @@ fn the_picture_is_the_one_that_is_no_smaller_version() {
         (vec![part(3, older_small, false)], "only smaller versions"),
         (vec![part(3, small, false), part(5, small, true)], "only smaller versions"),
         (vec![part(9, full, false), part(9, full, false)], "2 pictures"),
+        (vec![part(3, full, false), part(9, full, false)], "(3 x 3 and 9 x 9)"),
+        // A thumbnail that does not say that it is one.
+        (vec![part(3, full, false), part(9, full, true)], "pictures of 3 x 3 and 9 x 9 pixels"),
+        (vec![part(3, full, false), part(2, small, true), part(9, full, true)], "of 3 x 3 and 9 x 9"),
+        (vec![part(3, full, false), part(9, small, true)], "of 3 x 3 and 9 x 9"),
+        (vec![part(3, full, false), part(9, small, false)], "of 3 x 3 and 9 x 9"),
+        (vec![part(3, small, false), part(5, full, false), part(9, full, true)], "of 5 x 5 and 9 x 9"),
+        (vec![part(9, full, false), part(9, full, true)], "of 9 x 9 and 9 x 9"),
         (vec![part(9, &[(254, 2)], false), part(9, &[(254, 2)], false)], "2 pictures"),
         (vec![part(3, small, false), part(9, full, true), part(7, full, true)], "2 pictures"),
         (vec![part(9, full, false), part(9, &[(254, 4)], false)], "transparency mask"),

@@ -5,7 +5,6 @@ use std::io::Read;
 use flate2::Crc;
 use flate2::read::ZlibDecoder;
 
-use crate::picture::orientation;
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
 use crate::{Error, Limits, Result, SampleType};
@@ -24,8 +23,6 @@ pub(super) struct ImageHeader {
     pub(super) height: u32,
     pub(super) grey: bool,
     pub(super) sample_type: SampleType,
-    /// How the picture asks to be turned, 1..=8.
-    pub(super) orientation: u8,
     bits_per_pixel: u64,
     interlaced: bool,
 }
@@ -73,7 +70,6 @@ impl ImageHeader {
             height: size.height,
             grey,
             sample_type,
-            orientation: 1,
             bits_per_pixel: samples.saturating_mul(u64::from(depth)),
             interlaced: interlace == 1,
         })
@@ -139,30 +135,13 @@ pub(super) struct Walked {
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<ImageHeader> {
     let mut reader = Reader::new(bytes);
-    let image = ImageHeader::read(&mut reader, limits)?;
-    // Exif data may stand behind the pixels; chunks are stepped over, and those that are cut are for `walk` to refuse.
-    let mut next = || -> Result<([u8; 4], &[u8])> {
-        let len = usize::try_from(u32_of(&mut reader)?).unwrap_or(usize::MAX);
-        let mut name = [0; 4];
-        name.copy_from_slice(reader.take(4)?);
-        let data = reader.take(len)?;
-        reader.take(4)?;
-        Ok((name, data))
-    };
-    while let Ok((name, data)) = next() {
-        match &name {
-            b"eXIf" => return Ok(ImageHeader { orientation: orientation::of_exif(data), ..image }),
-            b"IEND" => break,
-            _ => {}
-        }
-    }
-    Ok(image)
+    ImageHeader::read(&mut reader, limits)
 }
 
 /// Reads all chunks up to IEND. What follows it is not the picture's and is not looked at.
 pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut reader = Reader::new(bytes);
-    let mut image = ImageHeader::read(&mut reader, limits)?;
+    let image = ImageHeader::read(&mut reader, limits)?;
     let mut data = Vec::new();
     let mut data_ended = false;
     loop {
@@ -183,7 +162,6 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
             b"acTL" | b"fcTL" | b"fdAT" => {
                 return Err(unsupported("an animation", "a single picture").at(chunk.at));
             }
-            b"eXIf" if image.orientation == 1 => image.orientation = orientation::of_exif(chunk.data),
             // The decoder reads PLTE; an unknown chunk may be skipped if its first letter is small.
             [first, ..] if &chunk.name != b"PLTE" && first.is_ascii_uppercase() => {
                 return Err(

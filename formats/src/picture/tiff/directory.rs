@@ -4,7 +4,8 @@
 //! Many files hold more than the picture: previews before it (camera raws, of which the first directory is a
 //! thumbnail), smaller versions after it, pages, masks. `NewSubfileType` tells them apart. The picture is the only
 //! directory of the file's chain that is no reduced version of another; if all of the chain are reduced, the only
-//! such one among their `SubIFDs`. Anything else is refused, as what is meant cannot be known.
+//! such one among their `SubIFDs`. Anything else is refused, as what is meant cannot be known; so is a picture that is
+//! smaller than another directory's, wherever that stands.
 
 use crate::picture::size::unsupported;
 use crate::reader::Reader;
@@ -31,9 +32,14 @@ pub(super) mod tag {
     pub(crate) const TILE_LENGTH: u16 = 323;
     pub(crate) const TILE_OFFSETS: u16 = 324;
     pub(crate) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(crate) const TRANSFER_FUNCTION: u16 = 301;
     pub(crate) const SUB_IFDS: u16 = 330;
     pub(crate) const EXTRA_SAMPLES: u16 = 338;
     pub(crate) const SAMPLE_FORMAT: u16 = 339;
+    pub(crate) const XMP: u16 = 700;
+    pub(crate) const EXIF_IFD: u16 = 34665;
+    pub(crate) const ICC_PROFILE: u16 = 34675;
+    pub(crate) const COLOUR_SPACE: u16 = 40961;
 }
 
 /// Directories of one file that are looked at.
@@ -99,48 +105,65 @@ pub(super) struct Directory<'a> {
 impl<'a> Directory<'a> {
     /// The directory of the picture; see the [module](self).
     pub(super) fn read(bytes: &'a [u8]) -> Result<Directory<'a>> {
-        let first = Directory::first(bytes)?;
-        let at = first.at;
-        let chain = first.followed()?;
-        let children: Vec<Directory<'a>> = if chain.iter().all(|one| one.is_reduced().unwrap_or(false)) {
-            let mut children = Vec::new();
-            for parent in &chain {
-                for offset in parent.list(tag::SUB_IFDS)?.unwrap_or_default() {
-                    if children.len() >= MAX_DIRECTORIES {
-                        return Err(too_many(parent.at));
-                    }
-                    children.push(parent.sibling(offset)?);
-                }
-            }
-            children
-        } else {
-            Vec::new()
-        };
-        let (directories, of_chain) = (chain.len(), chain.len().saturating_add(children.len()));
-        let mut pictures = Vec::new();
-        for directory in chain.into_iter().chain(children) {
+        let mut directories = Directory::first(bytes)?.followed()?;
+        let (at, mut looked_at) = (directories.first().map_or(0, |first| first.at), directories.len());
+        add_below(&mut directories)?;
+        if directories.iter().take(looked_at).all(|one| one.is_reduced().unwrap_or(false)) {
+            looked_at = directories.len();
+        }
+        let (mut pictures, mut others) = (Vec::new(), Vec::new());
+        for (number, directory) in directories.into_iter().enumerate() {
             let kind = directory.number(tag::NEW_SUBFILE_TYPE, Some(0))?;
-            if kind & MASK != 0 && kind & REDUCED == 0 {
+            if kind & MASK != 0 && kind & REDUCED == 0 && number < looked_at {
                 return Err(unsupported("a transparency mask", "a picture that is opaque").at(directory.at));
             }
-            if !directory.is_reduced()? {
+            if number < looked_at && !directory.is_reduced()? {
                 pictures.push(directory);
+            } else if kind & MASK == 0 {
+                others.push(directory);
             }
         }
+        let sizes = pictures.iter().map(Directory::size).collect::<Result<Vec<_>>>()?;
         let mut pictures = pictures.into_iter();
         match (pictures.next(), pictures.len()) {
-            (Some(only), 0) => Ok(only),
+            (Some(only), 0) => only.unless_rivalled(&others),
             (Some(first), more) => Err(unsupported(
-                format!("{} pictures in {directories} directories", more.saturating_add(1)),
+                format!("{} pictures in {looked_at} directories ({})", more.saturating_add(1), told(&sizes)),
                 "one, beside smaller versions of it; save it alone in a file (tiffcp, or ImageMagick's FILE.tif[0])",
             )
             .at(first.at)),
             (None, _) => Err(unsupported(
-                format!("only smaller versions of a picture (NewSubfileType 1) in {of_chain} directories"),
+                format!("only smaller versions of a picture (NewSubfileType 1) in {looked_at} directories"),
                 "the full picture; a camera's raw file must be converted first, to a TIFF of 16 bits say",
             )
             .at(at)),
         }
+    }
+
+    /// Itself, if no other directory holds more pixels, or as many and does not say that it is a version of another:
+    /// some programs put a thumbnail first and say nothing of it.
+    fn unless_rivalled(self, others: &[Directory<'_>]) -> Result<Directory<'a>> {
+        let (width, height) = self.size()?;
+        let pixels = width.saturating_mul(height);
+        for other in others {
+            let (other_width, other_height) = other.size()?;
+            let others_pixels = other_width.saturating_mul(other_height);
+            if others_pixels > pixels || (others_pixels == pixels && !other.is_reduced()?) {
+                let sizes = told(&[(width, height), (other_width, other_height)]);
+                return Err(unsupported(
+                    format!("pictures of {sizes} pixels, of which the first claims to be the picture"),
+                    "the picture larger than all its other versions; save it alone in a file (tiffcp, or \
+                     ImageMagick's FILE.tif[0])",
+                )
+                .at(other.at));
+            }
+        }
+        Ok(self)
+    }
+
+    /// Columns and rows, 0 where they are not told.
+    fn size(&self) -> Result<(u64, u64)> {
+        Ok((self.number(tag::WIDTH, Some(0))?, self.number(tag::HEIGHT, Some(0))?))
     }
 
     /// The first directory of a file, whatever it is for.
@@ -193,7 +216,7 @@ impl<'a> Directory<'a> {
     }
 
     /// Another directory of the same file.
-    fn sibling(&self, offset: u64) -> Result<Directory<'a>> {
+    pub(super) fn sibling(&self, offset: u64) -> Result<Directory<'a>> {
         Directory::at(self.bytes, &self.start(), offset)
     }
 
@@ -243,6 +266,14 @@ impl<'a> Directory<'a> {
         (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
     }
 
+    /// The bytes of a tag of any type, as far as they lie in the file; `None` if there is no such tag.
+    pub(super) fn bytes_of(&self, tag: u16) -> Option<&'a [u8]> {
+        let entry = self.entries.iter().find(|entry| entry.tag == tag)?;
+        let len = entry.count.saturating_mul(u64::from(bytes_of(entry.kind).unwrap_or(1)));
+        let rest = self.bytes.get(usize::try_from(entry.at).ok()?..).unwrap_or_default();
+        Some(rest.get(..usize::try_from(len).ok()?).unwrap_or(rest))
+    }
+
     /// The only value of a tag, or `default` where there is no such tag.
     pub(super) fn number(&self, tag: u16, default: Option<u64>) -> Result<u64> {
         match (self.list(tag)?.as_deref(), default) {
@@ -255,6 +286,35 @@ impl<'a> Directory<'a> {
             (None, None) => Err(Error::malformed(format!("no tag {tag}"), "one").at(self.at)),
         }
     }
+}
+
+/// Adds the directories that those of the chain lead to by `SubIFDs`, and those below and behind these.
+fn add_below(directories: &mut Vec<Directory<'_>>) -> Result<()> {
+    let chain = directories.len();
+    let mut parent = 0usize;
+    while let Some(one) = directories.get(parent) {
+        let mut offsets = one.list(tag::SUB_IFDS)?.unwrap_or_default();
+        if parent >= chain && one.next != 0 {
+            offsets.push(one.next);
+        }
+        for offset in offsets.into_iter().filter(|&offset| offset != 0) {
+            if directories.iter().any(|known| u64::try_from(known.at) == Ok(offset)) {
+                continue;
+            }
+            let Some(one) = directories.get(parent) else { break };
+            if directories.len() >= MAX_DIRECTORIES {
+                return Err(too_many(one.at));
+            }
+            let child = one.sibling(offset)?;
+            directories.push(child);
+        }
+        parent = parent.saturating_add(1);
+    }
+    Ok(())
+}
+
+fn told(sizes: &[(u64, u64)]) -> String {
+    sizes.iter().map(|(width, height)| format!("{width} x {height}")).collect::<Vec<_>>().join(" and ")
 }
 
 fn too_many(at: usize) -> Error {

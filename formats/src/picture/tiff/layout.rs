@@ -1,8 +1,8 @@
 //! What the samples of a TIFF are and where they lie in the file.
 
 use super::directory::{Directory, tag};
-use crate::picture::grey_or_rgb;
 use crate::picture::size::{Size, unsupported};
+use crate::picture::{grey_or_rgb, orientation, profile};
 use crate::{Error, Limits, Result, SampleType};
 
 /// How the bytes of a strip or tile are packed.
@@ -75,6 +75,8 @@ pub(super) struct Layout {
     pub(super) predictor: Predictor,
     /// How the picture asks to be turned, 1..=8; samples are as stored.
     pub(super) orientation: u8,
+    /// What is said of colours if it is not sRGB.
+    pub(super) profile: Option<String>,
     rgb: bool,
     chunks: Chunks,
     /// Of the strips or tiles: offset and length.
@@ -115,7 +117,7 @@ impl Layout {
         if directory.number(tag::FILL_ORDER, Some(1))? != 1 {
             return of("fill order 2".to_owned(), "1");
         }
-        let orientation = match directory.number(tag::ORIENTATION, Some(1))? {
+        let orientation = match stated_orientation(&directory, bytes)? {
             0 => 1,
             stated => match u8::try_from(stated) {
                 Ok(stated @ 1..=8) => stated,
@@ -143,6 +145,7 @@ impl Layout {
             compression,
             predictor,
             orientation,
+            profile: profile(&directory),
             rgb,
             chunks,
             places,
@@ -291,6 +294,26 @@ fn interpretation(directory: &Directory<'_>, stored: u64) -> Result<(bool, bool)
             )
             .at(directory.at))
         }
+    }
+}
+
+/// How the picture asks to be turned. Cameras put it into the first directory, whichever is the picture; others into
+/// XMP.
+fn stated_orientation(directory: &Directory<'_>, bytes: &[u8]) -> Result<u64> {
+    if directory.list(tag::ORIENTATION)?.is_some() {
+        return directory.number(tag::ORIENTATION, None);
+    }
+    let by_xmp = directory.bytes_of(tag::XMP).map_or(1, orientation::of_xmp);
+    Directory::first(bytes)?.number(tag::ORIENTATION, Some(u64::from(by_xmp)))
+}
+
+/// What is said of colours if it is not sRGB.
+fn profile(directory: &Directory<'_>) -> Option<String> {
+    let curve =
+        || directory.bytes_of(tag::TRANSFER_FUNCTION).map(|_| "a transfer function of its own".to_owned());
+    match directory.bytes_of(tag::ICC_PROFILE) {
+        Some(icc) => profile::of_icc(icc),
+        None => curve(),
     }
 }
 

@@ -1,0 +1,61 @@
+//! What a picture says of its colours, where that is not what integers are taken for: sRGB. Nothing of it is applied; the
+//! caller is told.
+
+use super::tiff;
+use crate::reader::Reader;
+
+/// Longest name of a profile that is told, characters.
+const LONGEST_NAME: usize = 60;
+
+/// Of an ICC profile (ICC.1:2022): what it is called; `None` if that is sRGB.
+pub(crate) fn of_icc(profile: &[u8]) -> Option<String> {
+    let Some(name) = description(profile) else {
+        return Some("an ICC profile without a readable name".to_owned());
+    };
+    let is_srgb = name.to_lowercase().replace(['-', '_', ' '], "").contains("srgb");
+    let shown: String = name.chars().take(LONGEST_NAME).collect();
+    (!is_srgb).then(|| format!("the ICC profile {shown:?}"))
+}
+
+/// Of a block of Exif data: a colour space that is none or another than sRGB, as cameras state Adobe RGB.
+pub(crate) fn of_exif(block: &[u8]) -> Option<String> {
+    // As for the orientation: not every camera writes the offset of a next directory behind the last.
+    match tiff::exif_colour_space(&[block, &[0; 8]].concat()) {
+        Ok(Some(2)) => Some("the Exif colour space 2 (Adobe RGB)".to_owned()),
+        Ok(Some(0xFFFF)) => Some("the Exif colour space \"uncalibrated\" (Adobe RGB, perhaps)".to_owned()),
+        _ => None,
+    }
+}
+
+/// The text of the tag `desc`, in the first language that there is.
+fn description(profile: &[u8]) -> Option<String> {
+    let number = |reader: &mut Reader<'_>| -> Option<usize> {
+        let bytes = reader.take(4).ok()?.try_into().ok()?;
+        usize::try_from(u32::from_be_bytes(bytes)).ok()
+    };
+    let mut tags = Reader::new(profile.get(128..)?);
+    let count = number(&mut tags)?;
+    // A tag takes 12 bytes, so that the end of the profile ends this loop.
+    for _ in 0..count {
+        let is_description = tags.take(4).ok()? == b"desc";
+        let (at, len) = (number(&mut tags)?, number(&mut tags)?);
+        if !is_description {
+            continue;
+        }
+        let data = profile.get(at..at.checked_add(len)?)?;
+        let mut fields = Reader::new(data);
+        let kind = fields.take(8).ok()?.get(..4)?;
+        if kind == b"desc" {
+            let len = number(&mut fields)?;
+            let text = fields.take(len).ok()?;
+            return Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned());
+        }
+        // `mluc`: the number of records, their size, then language and country, length and place of each.
+        fields.take(12).ok()?;
+        let (len, at) = (number(&mut fields)?, number(&mut fields)?);
+        let text = data.get(at..at.checked_add(len)?).filter(|_| kind == b"mluc")?;
+        let units = text.as_chunks::<2>().0.iter().map(|&pair| u16::from_be_bytes(pair));
+        return Some(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect());
+    }
+    None
+}

@@ -1,0 +1,197 @@
+//! What pictures say of turning and of colours beside their pixels: told alike by all formats, and applied by none.
+
+use std::io::Write;
+
+use btfkit_formats::jpeg::EncodeOptions;
+use btfkit_formats::picture::{PictureHeader, check, decode, header};
+use btfkit_formats::{Limits, Samples};
+
+use crate::picture_files::{Png, Tiff, png_chunk, tiff_samples};
+use crate::support::jpeg_of;
+
+/// What header and check say alike.
+fn said(bytes: &[u8]) -> PictureHeader {
+    let found = header(bytes, &Limits::default()).unwrap();
+    assert_eq!(check(bytes, &Limits::default()).unwrap(), found);
+    found
+}
+
+fn samples(bytes: &[u8]) -> Samples {
+    decode(bytes, &Limits::default()).unwrap().samples
+}
+
+/// An ICC profile of nothing but a name, of version 2 or 4.
+fn icc(name: &str, version: u8) -> Vec<u8> {
+    let data = if version == 2 {
+        [&b"desc\0\0\0\0"[..], &(name.len() as u32 + 1).to_be_bytes(), name.as_bytes(), b"\0"].concat()
+    } else {
+        let text: Vec<u8> = name.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let head =
+            [&b"mluc\0\0\0\0\0\0\0\x01\0\0\0\x0CenUS"[..], &(text.len() as u32).to_be_bytes()].concat();
+        [&head[..], &28u32.to_be_bytes(), &text].concat()
+    };
+    let tags = [&2u32.to_be_bytes()[..], b"cprt", &[0; 8], b"desc"].concat();
+    let at = 128 + tags.len() as u32 + 8;
+    [vec![0; 128], tags, at.to_be_bytes().to_vec(), (data.len() as u32).to_be_bytes().to_vec(), data].concat()
+}
+
+fn zlib(data: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(data).unwrap();
+    encoder.finish().unwrap()
+}
+
+fn iccp(profile: &[u8]) -> Vec<u8> {
+    png_chunk(b"iCCP", &[&b"ICC profile\0\0"[..], &zlib(profile)].concat())
+}
+
+fn png(chunks: &[Vec<u8>]) -> Vec<u8> {
+    Png { before: chunks.concat(), ..Png::new(6, 4, 8, 2, false) }.bytes()
+}
+
+fn segment(code: u8, data: &[u8]) -> Vec<u8> {
+    [&[0xFF, code][..], &(data.len() as u16 + 2).to_be_bytes(), data].concat()
+}
+
+fn jpeg(segments: &[Vec<u8>]) -> Vec<u8> {
+    let plain = jpeg_of(16, 8, 3, &EncodeOptions::UBO2003);
+    [&plain[..2], &segments.concat(), &plain[2..]].concat()
+}
+
+fn tiff(tags: &[(u16, Vec<u64>)]) -> Vec<u8> {
+    let mut tiff = Tiff::new((4, 4, 3), 8, 1, 4);
+    for (tag, values) in tags {
+        tiff.set(*tag, values);
+    }
+    let samples = tiff_samples(&tiff, 48, "u8");
+    tiff.with_strips(&samples, 4, false).bytes()
+}
+
+/// Bytes as the numbers of a little-endian tag.
+fn words(bytes: &[u8]) -> Vec<u64> {
+    bytes
+        .chunks(4)
+        .map(|part| part.iter().rev().fold(0, |value, &byte| (value << 8) | u64::from(byte)))
+        .collect()
+}
+
+fn exif_of_colours(space: u8) -> Vec<u8> {
+    // The directory at 8 leads to one at 26.
+    let first = b"MM\0*\0\0\0\x08\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1A\0\0\0\0";
+    [&first[..], b"\0\x01\xA0\x01\0\x03\0\0\0\x01", &[space, space, 0, 0], &[0; 4]].concat()
+}
+
+#[test]
+fn profiles_other_than_srgb_are_told() {
+    for version in [2, 4] {
+        let (adobe, srgb) = (icc("Adobe RGB (1998)", version), icc("sRGB IEC61966-2.1", version));
+        let parts = |profile: &[u8]| {
+            let (first, second) = profile.split_at(150);
+            [(1u8, first), (2, second)]
+                .map(|(n, part)| segment(0xE2, &[&b"ICC_PROFILE\0"[..], &[n, 2], part].concat()))
+        };
+        let icc_tag = |profile: &[u8]| tiff(&[(34675, words(profile))]);
+        for bytes in [png(&[iccp(&adobe)]), jpeg(&parts(&adobe)), icc_tag(&adobe)] {
+            assert_eq!(said(&bytes).profile.unwrap(), "the ICC profile \"Adobe RGB (1998)\"");
+        }
+        for bytes in [png(&[iccp(&srgb)]), jpeg(&parts(&srgb)), icc_tag(&srgb)] {
+            assert_eq!(said(&bytes).profile, None);
+        }
+        for end in [0, 100, 131, 140, adobe.len() - 6] {
+            for bytes in [png(&[iccp(&adobe[..end])]), icc_tag(&adobe[..end.max(4)])] {
+                assert!(said(&bytes).profile.unwrap().contains("without a readable name"), "{end}");
+            }
+        }
+        assert_eq!(samples(&png(&[iccp(&adobe)])), samples(&png(&[])));
+        assert_eq!(samples(&jpeg(&parts(&adobe))), samples(&jpeg(&[])));
+        assert_eq!(samples(&icc_tag(&adobe)), samples(&tiff(&[])));
+    }
+    assert_eq!(said(&tiff(&[(301, vec![1])])).profile.unwrap(), "a transfer function of its own");
+}
+
+#[test]
+fn colour_spaces_of_exif_count_where_no_profile_does() {
+    let of_png = |space| png(&[png_chunk(b"eXIf", &exif_of_colours(space))]);
+    let of_jpeg = |space| segment(0xE1, &[b"Exif\0\0", &exif_of_colours(space)[..]].concat());
+    for bytes in [of_png(0xFF), jpeg(&[of_jpeg(0xFF)])] {
+        assert!(said(&bytes).profile.unwrap().contains("uncalibrated"));
+    }
+    for bytes in [of_png(0), jpeg(&[of_jpeg(0)]), png(&[]), jpeg(&[]), tiff(&[])] {
+        assert_eq!(said(&bytes).profile, None);
+    }
+    let srgb = segment(0xE2, &[&b"ICC_PROFILE\0\x01\x01"[..], &icc("sRGB", 2)].concat());
+    assert_eq!(said(&jpeg(&[of_jpeg(0xFF), srgb])).profile, None);
+}
+
+#[test]
+fn of_the_words_of_a_png_the_strongest_counts() {
+    let gamma = |value: u32| png_chunk(b"gAMA", &value.to_be_bytes());
+    let primaries = |first: u32| {
+        let list = [first, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+        png_chunk(b"cHRM", &list.map(u32::to_be_bytes).concat())
+    };
+    let cicp = |points: [u8; 4]| png_chunk(b"cICP", &points);
+    let srgb = png_chunk(b"sRGB", &[0]);
+    for (chunks, told) in [
+        (vec![gamma(45_455)], None),
+        (vec![gamma(45_455), primaries(31_270)], None),
+        (vec![gamma(100_000)], Some("the gamma 1.00000 (gAMA)")),
+        (vec![gamma(55_556)], Some("the gamma 0.55556 (gAMA)")),
+        (vec![gamma(100_000), srgb.clone()], None),
+        (vec![primaries(34_000)], Some("primaries of its own (cHRM)")),
+        (vec![primaries(34_000), gamma(100_000)], Some("the gamma 1.00000 (gAMA)")),
+        (vec![cicp([9, 16, 0, 1])], Some("the code points [9, 16, 0, 1] (cICP)")),
+        (vec![cicp([9, 16, 0, 1]), srgb.clone()], Some("the code points [9, 16, 0, 1] (cICP)")),
+        (vec![cicp([1, 13, 0, 1]), iccp(&icc("Display P3", 4))], None),
+        (vec![srgb, iccp(&icc("Display P3", 4))], Some("the ICC profile \"Display P3\"")),
+        (vec![gamma(100_000), iccp(&icc("sRGB v4", 4))], None),
+    ] {
+        assert_eq!(said(&png(&chunks)).profile.as_deref(), told);
+    }
+}
+
+#[test]
+fn a_turn_is_told_wherever_it_stands() {
+    let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0";
+    let attribute = b"<rdf:Description tiff:Orientation=\"6\" x=\"1\"/>";
+    let element = b"<tiff:Orientation>\n 6 </tiff:Orientation>";
+    let raw = |kind: &str, data: &[u8]| {
+        let digits: String = data.iter().map(|byte| format!("{byte:02x}")).collect();
+        format!("\n{kind}\n {:8}\n{}\n{}\n", data.len(), &digits[..10], &digits[10..])
+    };
+    let app1 = raw("exif", &[b"Exif\0\0", &exif[..]].concat());
+    let raw_xmp = raw("xmp", element);
+    let itxt = |packed: bool, text: &[u8]| {
+        let text = if packed { zlib(text) } else { text.to_vec() };
+        png_chunk(b"iTXt", &[&b"XML:com.adobe.xmp\0"[..], &[u8::from(packed), 0], b"en\0\0", &text].concat())
+    };
+    let named = |key: &str, text: &[u8]| [format!("Raw profile type {key}\0").as_bytes(), text].concat();
+    let mut all = vec![tiff(&[(700, words(attribute))]), tiff(&[(274, vec![6])])];
+    all.extend(
+        [&attribute[..], element]
+            .map(|packet| jpeg(&[segment(0xE1, &[b"http://ns.adobe.com/xap/1.0/\0", packet].concat())])),
+    );
+    all.extend(
+        [
+            png_chunk(b"eXIf", exif),
+            itxt(false, attribute),
+            itxt(true, element),
+            png_chunk(b"tEXt", &named("exif", app1.as_bytes())),
+            png_chunk(b"tEXt", &named("APP1", app1.as_bytes())),
+            png_chunk(b"zTXt", &named("exif", &[&[0], &zlib(app1.as_bytes())[..]].concat())),
+            png_chunk(b"tEXt", &named("xmp", raw_xmp.as_bytes())),
+        ]
+        .map(|chunk| png(&[chunk])),
+    );
+    for (number, bytes) in all.iter().enumerate() {
+        assert_eq!(said(bytes).orientation, 6, "{number}");
+    }
+    for text in
+        [&b""[..], b"tiff:Orientation", b"tiff:Orientation=\"\"", b"tiff:Orientation=\"9\"", b"Orientation=6"]
+    {
+        assert_eq!(said(&png(&[itxt(false, text)])).orientation, 1);
+        assert_eq!(said(&tiff(&[(700, words(text))])).orientation, 1);
+    }
+    assert_eq!(said(&png(&[png_chunk(b"tEXt", b"Comment\0tiff:Orientation=\"6\"")])).orientation, 1);
+    assert_eq!(samples(&all[0]), samples(&tiff(&[])));
+}

@@ -57,8 +57,9 @@ pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Rep
 
 /// All diagnoses. Images with one fault are not blamed for what follows from it.
 pub fn examine(statistics: &Statistics) -> Report {
-    let mut checks =
-        vec![samples::numbers(statistics), samples::black(statistics), samples::contrast(statistics)];
+    let saturation = samples::saturation(statistics);
+    let contrast = samples::contrast(statistics, !saturation.findings.is_empty());
+    let mut checks = vec![samples::numbers(statistics), samples::black(statistics), contrast];
     let put_off = |names: &[&'static str], reason: &str| -> Vec<Check> {
         names.iter().map(|name| Check::not_checked(name, format!("{reason}: repair that first"))).collect()
     };
@@ -75,7 +76,7 @@ pub fn examine(statistics: &Statistics) -> Report {
         checks.extend(put_off(&names, "no image shows anything"));
         return Report { checks };
     }
-    checks.push(samples::saturation(statistics));
+    checks.push(saturation);
     checks.push(duplicates::check(statistics));
     if has_fault(&checks, samples::SATURATION) {
         checks.push(azimuth::check(statistics));

@@ -128,17 +128,21 @@ pub fn black(statistics: &Statistics) -> Check {
     Check::done(BLACK, detail, alarm, vec![finding])
 }
 
-/// Looks for images on which nothing is to be seen, though they need not be black.
-pub fn contrast(statistics: &Statistics) -> Check {
+/// Looks for images on which nothing is to be seen, though they need not be black. Of a measurement that is `saturated`
+/// images that are clipped are told already.
+pub fn contrast(statistics: &Statistics, saturated: bool) -> Check {
     let plain: Vec<Place> = places(statistics)
         .filter(|&(view, light)| statistics.is_plain(view, light))
         .map(|(view, light)| Place::image(view, light))
         .collect();
     let all = statistics.images.len();
     let nothing = plain.len() == all;
-    // Single black ones are told as such.
-    let is_black = |place: &Place| statistics.is_black(place.view.unwrap_or(0), place.light.unwrap_or(0));
-    let plain: Vec<Place> = plain.into_iter().filter(|place| nothing || !is_black(place)).collect();
+    // Single ones that are black, or among many that are clipped, are told as such.
+    let is_told = |place: &Place| {
+        let (view, light) = (place.view.unwrap_or(0), place.light.unwrap_or(0));
+        statistics.is_black(view, light) || (saturated && statistics.clipped_share(view, light) > CLIPPED.0)
+    };
+    let plain: Vec<Place> = plain.into_iter().filter(|place| nothing || !is_told(place)).collect();
     let share = plain.len() as f64 / all.max(1) as f64;
     let detail = format!("{} of {} of one brightness throughout", plain.len(), counted(all, "image"));
     if plain.is_empty() {

@@ -20,7 +20,7 @@ pub(super) struct Found {
 /// What to do where names tell nothing.
 const NAMES: &str = "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --pattern \
      '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' says where the angles stand, --table FILE.csv lists them, \
-     `btf import --help` explains";
+     docs/formats/folders.md lists the fields";
 
 const FRONTAL: &str = "there are no view directions: one frontal view";
 

@@ -8,6 +8,9 @@ use crate::error::{Error, Result};
 /// Directions nearer to each other than this are hardly meant to be two, degrees.
 const NEAR_DEG: f64 = 0.05;
 
+/// A right angle in radians, to two digits above: what theta never exceeds where radians are taken for degrees.
+const RIGHT_ANGLE_RAD: f64 = 1.58;
+
 /// Names of a channel that says how opaque a texel is.
 const ALPHA: [&str; 8] = ["a", "alpha", "ra", "ga", "ba", "ar", "ag", "ab"];
 
@@ -63,6 +66,29 @@ pub(super) fn near_directions(contents: &Contents) -> Vec<String> {
         ))
     };
     [told(&contents.views, "views"), told(&contents.lights, "lights")].into_iter().flatten().collect()
+}
+
+/// What to know of angles that may be others than polar angles in degrees.
+pub(super) fn doubtful_angles(contents: &Contents) -> Vec<String> {
+    let polar = |list: &[Direction]| list.iter().map(|d| d.theta_rad.to_degrees()).fold(0.0, f64::max);
+    let (views, lights) = (polar(&contents.views), polar(&contents.lights));
+    let highest = views.max(lights);
+    let mut notes = Vec::new();
+    if highest > 0.0 && highest <= RIGHT_ANGLE_RAD {
+        notes.push(format!(
+            "no direction is more than {highest:.3} degrees from the normal: if the angles are radians, say so by --pattern \
+             ({{theta_i:rad}} and so on)"
+        ));
+    }
+    for (what, highest) in [("view", views), ("light", lights)] {
+        if highest > 89.5 {
+            notes.push(format!(
+                "a {what} is {highest:.1} degrees from the normal, where nothing can be seen: if the angles are elevations \
+                 above the surface, theta is 90 minus them"
+            ));
+        }
+    }
+    notes
 }
 
 /// The first two that are nearer than [`NEAR_DEG`], in the order of theta, and by how much.
@@ -131,6 +157,15 @@ mod tests {
             let error = require_channels(&contents(names, &[])).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
+    }
+
+    #[test]
+    fn angles_that_may_be_radians_or_elevations_are_told() {
+        let told = |lights: &[(f64, f64)]| doubtful_angles(&contents(&["Y"], lights));
+        assert_eq!(told(&[(0.0, 0.0)]), Vec::<String>::new());
+        assert_eq!(told(&[(0.0, 0.0), (75.0, 0.0)]), Vec::<String>::new());
+        assert!(told(&[(0.0, 0.0), (1.309, 3.0)])[0].contains("radians"));
+        assert!(told(&[(15.0, 0.0), (90.0, 0.0)])[0].contains("a light is 90.0 degrees"));
     }
 
     #[test]

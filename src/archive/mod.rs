@@ -158,7 +158,9 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
 
 /// What a user should know of an archive that its samples do not depend on, a sentence each.
 pub fn notes(source: &dyn Source) -> Vec<String> {
-    source.notes().into_iter().chain(claims::near_directions(source.contents())).collect()
+    let contents = source.contents();
+    let doubts = claims::near_directions(contents).into_iter().chain(claims::doubtful_angles(contents));
+    source.notes().into_iter().chain(doubts).collect()
 }
 
 /// The bytes of a small file beside an archive: a list, a table.

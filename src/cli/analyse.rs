@@ -26,7 +26,7 @@ use super::{Tell, bytes_text, number};
 #[derive(Args)]
 struct ClusterOptions {
     /// Number of clusters, n_c [default: 256, or as many as the tile has texels]
-    #[arg(long, group = "amount")]
+    #[arg(long, group = "amount", value_parser = number::count)]
     clusters: Option<usize>,
     /// Instead: the fewest clusters whose mean weighted |dL*| from their centres is at most this
     #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]

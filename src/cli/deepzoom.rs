@@ -51,6 +51,32 @@ impl Deepzoom {
         self.deepzoom || output.extension().is_some_and(|ending| ending == "dzi")
     }
 
+    /// Hands the names of the options that matter to `check`.
+    pub(super) fn expect_used(&self, check: impl Fn(&[&str]) -> Result<()>) -> Result<()> {
+        let mut used = vec![
+            "deepzoom",
+            "light",
+            "view",
+            "window",
+            "exposure",
+            "values",
+            "measurement",
+            "model",
+            "plane",
+            "seed",
+            "jitter",
+            "format",
+            "tile_size",
+            "overlap",
+            "dry_run",
+            "json",
+        ];
+        if matches!(self.format, TileFormat::Jpeg) {
+            used.push("quality");
+        }
+        check(&used)
+    }
+
     pub(super) fn run(
         &self,
         source: &Path,

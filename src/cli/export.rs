@@ -39,6 +39,9 @@ pub(super) struct Export {
     quality: Option<u8>,
     #[command(flatten)]
     deepzoom: Deepzoom,
+    /// The options that were given, by their names.
+    #[arg(skip)]
+    given: Vec<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -53,8 +56,30 @@ enum FormatName {
 }
 
 impl Export {
+    /// Takes note of the options that were given on the command line.
+    pub(super) fn note_given(&mut self, given: Vec<String>) {
+        self.given = given;
+    }
+
+    /// Refuses options that would change nothing.
+    fn expect_used(&self, what: &str, used: &[&str]) -> Result<()> {
+        let general = ["store", "output", "to", "threads", "memory", "progress", "quiet", "force"];
+        let idle = self
+            .given
+            .iter()
+            .find(|name| !general.contains(&name.as_str()) && !used.contains(&name.as_str()));
+        match idle {
+            None => Ok(()),
+            Some(name) => {
+                Err(Error::usage(format!("--{} changes nothing in {what}", name.replace('_', "-")))
+                    .hint("leave it out; btf export --help says which options are for which formats"))
+            }
+        }
+    }
+
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
+            self.deepzoom.expect_used(|used| self.expect_used("a Deep Zoom pyramid like this one", used))?;
             return self.deepzoom.run(&self.store, &self.output, self.quality, context, tell);
         }
         let format = match self.to {
@@ -70,6 +95,19 @@ impl Export {
                     .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
             })?,
         };
+        if self.to.is_some() && self.output.extension().is_some_and(|ending| ending == "dzi") {
+            return Err(Error::usage(
+                "--to asks for another format than the Deep Zoom pyramid that .dzi stands for",
+            )
+            .hint("leave out --to, or name the result otherwise"));
+        }
+        match format {
+            Format::Ubo2003 => self.expect_used("a zip of JPEGs", &["quality"]),
+            Format::Dfmf | Format::Fmf => self.expect_used("a Bonn container", &["rank"]),
+            Format::Exr | Format::Png => self.expect_used("a folder of pictures", &[]),
+            Format::Npy => self.expect_used("a numpy array", &[]),
+            Format::Hdf5 => self.expect_used("an HDF5 file", &[]),
+        }?;
         let measurement = Measurement::open(&self.store)?;
         let options = export::Options {
             output: self.output.clone(),

@@ -24,7 +24,7 @@ Examples:
   btf import tv*.zip wood.zarr                    one measurement in many pieces: the store is named last
   btf import *.zip *.btf --into stores            many archives, a store each; a bad one does not stop the others
   btf import felt.btf --shard 3/8                 the fourth of eight parts of the views, for a job array
-  btf import wall.btf --codec predictive          half the size of the default; zarr-python needs our module to read it
+  btf import wall.btf --codec predictive          a tenth to a fifth smaller; zarr-python needs our module to read it
 Interrupted, the same command goes on with the views that are missing.")]
 pub(super) struct Import {
     /// Archives; the last name is the store to make if it ends in .zarr, unless --into is given
@@ -71,9 +71,10 @@ impl Import {
             |path: &Path| path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists();
         let folder = self.into.clone().unwrap_or_default();
         // Misspelt, the last of many archives is not to become a store.
-        if let Some(absent) =
-            self.paths.iter().find(|path| !(path.exists() || self.into.is_none() && is_store(path)))
-        {
+        let is_new = |path: &Path| {
+            self.into.is_none() && is_store(path) && self.paths.last().is_some_and(|last| last == path)
+        };
+        if let Some(absent) = self.paths.iter().find(|path| !(path.exists() || is_new(path))) {
             expect_readable(absent)?;
             let error = Error::missing(format!("{}: no such archive", absent.display()));
             return Err(

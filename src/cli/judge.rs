@@ -29,7 +29,8 @@ pub(super) struct Judge {
     /// The measurement that the model was made of
     #[arg(long, value_name = "MEASUREMENT")]
     against: PathBuf,
-    /// The model of an enlarged index [default: beside it, under the name it had]
+    /// The model of an enlarged index [default: where it lay, or of that name beside the index or in the current
+    /// folder]
     #[arg(long)]
     model: Option<PathBuf>,
     /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216

@@ -132,11 +132,26 @@ enum Command {
     Man(help::Manual),
 }
 
+/// Names of the arguments that a command was given.
+fn given(matches: &clap::ArgMatches) -> Vec<String> {
+    let Some((_, command)) = matches.subcommand() else { return Vec::new() };
+    let names = command.ids().map(clap::Id::as_str);
+    let given = names.filter(|name| {
+        // Groups are among them, too.
+        matches!(command.try_contains_id(name), Ok(true))
+            && command.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
+    });
+    given.map(str::to_owned).collect()
+}
+
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
     let matches = help::command().try_get_matches();
-    let cli = matches.and_then(|matches| Cli::from_arg_matches(&matches));
-    let cli = cli.unwrap_or_else(|error| help::explained(error).exit());
+    let cli = matches.and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, given(&matches))));
+    let (mut cli, given) = cli.unwrap_or_else(|error| help::explained(error).exit());
+    if let Command::Export(export) = &mut cli.command {
+        export.note_given(given);
+    }
     let threads = cli.common.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,

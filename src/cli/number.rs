@@ -11,6 +11,12 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     number(text, "a number above 0", |number| number > 0.0)
 }
 
+/// How many, at least one.
+pub(super) fn count(text: &str) -> Result<usize, String> {
+    let number = text.trim().parse::<usize>().ok().filter(|&number| number > 0);
+    number.ok_or_else(|| format!("expected a whole number, 1 or more, got {text:?}"))
+}
+
 /// From 0 to 1.
 pub(super) fn share(text: &str) -> Result<f64, String> {
     number(text, "a number from 0 to 1", |number| (0.0..=1.0).contains(&number))

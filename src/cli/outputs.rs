@@ -34,6 +34,15 @@ impl Naming<'_> {
         {
             return Ok(vec![Pair { input: input.clone(), output: output.clone() }]);
         }
+        // Nothing is begun where a name is wrong, or stands in another's place.
+        if let ([_, .., last], None) = (names, into)
+            && last.symlink_metadata().is_err()
+        {
+            return Err(Error::missing(format!("{}: no such {}", last.display(), self.reads)).hint(format!(
+                "the result of one input is named last, and does not end in {}; for many inputs use --into FOLDER",
+                self.ending.unwrap_or_default()
+            )));
+        }
         let pair = |input: &PathBuf| Pair { input: input.clone(), output: self.output(input, into) };
         let pairs: Vec<Pair> = names.iter().map(pair).collect();
         match wanted_twice(pairs.iter().map(|pair| pair.output.as_path())) {

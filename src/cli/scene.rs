@@ -26,11 +26,12 @@ pub(super) struct SceneArgs {
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
     #[arg(long, value_enum, default_value = "model")]
     values: ValuesName,
-    /// The measurement, for --values measured [default: where it lay when the model was made; beside the
+    /// The measurement; implies --values measured [default: where it lay when the model was made; beside the
     /// model or in the current folder, without .model in its name]
     #[arg(long)]
     measurement: Option<PathBuf>,
-    /// The model of an enlarged index [default: beside it, under the name it had]
+    /// The model of an enlarged index [default: where it lay, or of that name beside the index or in the current
+    /// folder]
     #[arg(long)]
     model: Option<PathBuf>,
     /// Of a model: a part of its endless plane, made at once and not stored; --window says which, negative x and y too
@@ -58,9 +59,9 @@ impl SceneArgs {
             source: source.to_owned(),
             model: self.model.clone(),
             subject,
-            values: match self.values {
-                ValuesName::Model => Values::Model,
-                ValuesName::Measured => Values::Measured(self.measurement.clone()),
+            values: match (self.values, &self.measurement) {
+                (ValuesName::Model, None) => Values::Model,
+                (ValuesName::Measured, _) | (_, Some(_)) => Values::Measured(self.measurement.clone()),
             },
             plane: self.plane.then(|| PlaneOptions {
                 seed: self.seed,

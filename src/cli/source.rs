@@ -40,7 +40,7 @@ pub(super) struct SourceArgs {
     #[arg(long, value_name = "TEXT")]
     pattern: Option<String>,
     /// A CSV table with the columns file, theta_i, phi_i, theta_v, phi_v (degrees)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "pattern")]
     table: Option<PathBuf>,
     /// Directions of an array, or the order of a BIG or MIF file, that has none of its own
     #[arg(long, value_parser = ["ubo81", "bonn151", "uniform"])]

@@ -237,3 +237,100 @@ pub(super) fn one_of(kinds: &[&str]) -> String {
         _ => names.concat(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use super::*;
+
+    /// The error of a path that is no store, with its advice.
+    fn told(path: &Path) -> String {
+        let error = other(path).unwrap().unwrap().unexpected(path, &[measurement::KIND]);
+        format!("{error}; {}", error.guidance().unwrap_or_default())
+    }
+
+    #[test]
+    fn files_are_called_what_they_are_and_archives_are_to_be_imported() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("given.bin");
+        let (import, pictures) = ("import it first: btf import", "a folder of pictures can be imported");
+        for (head, what, advice) in [
+            (&b"PK\x03\x04rest"[..], "an archive (a zip archive)", import),
+            (b"PK\x05\x06rest", "an archive (a zip archive)", import),
+            (b"!PVF06FCrest", "an archive (a Bonn BTF archive)", import),
+            (b"4627\n1\n", "an archive (an MLVQ database)", import),
+            (b"BIG\0\0\0\0\0rest", "an archive (a UTIA BIG archive)", import),
+            (b"MIF FILErest", "an archive (a MIF archive)", import),
+            (b"\x93NUMPYrest", "an archive (a numpy array)", import),
+            (b"\x89HDF\r\n\x1a\nrest", "an archive (an HDF5 file)", import),
+            (b"\x89PNG\r\n", "a picture", pictures),
+            (b"\xff\xd8\xff\xe0", "a picture", pictures),
+            (b"II*\0", "a picture", pictures),
+            (b"MM\0*", "a picture", pictures),
+            (b"\x76\x2f\x31\x01", "a picture", pictures),
+            (
+                b"<Image xmlns=\"http://schemas.microsoft.com/deepzoom/2008\"",
+                "a Deep Zoom pyramid",
+                "name the store",
+            ),
+            (b"anything else", "a file", import),
+            (b"", "a file", import),
+        ] {
+            fs::write(&path, head).unwrap();
+            let told = told(&path);
+            assert!(
+                told.contains(&format!("given.bin: got {what}, expected a measurement")),
+                "{head:?}: {told}"
+            );
+            assert!(told.contains(advice), "{head:?}: {told}");
+        }
+    }
+
+    #[test]
+    fn folders_are_called_what_they_are_and_what_is_left_of_a_killed_writer_is_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        for (files, what) in [
+            (&[".zgroup"][..], "a Zarr store of version 2 (.zgroup)"),
+            (&[".zattrs", "a.jpg"], "a Zarr store of version 2 (.zattrs)"),
+            (&[PYRAMID_STATE], "the tiles of a Deep Zoom pyramid"),
+            (&["notes.txt", "a.JPG"], "a folder of pictures"),
+            (&["a.exr"], "a folder of pictures"),
+            (&["index/zarr.json"], "a store that has lost its zarr.json"),
+            (&["notes.txt"], "a folder without a zarr.json"),
+            (&["sub/a.jpg"], "a folder without a zarr.json"),
+        ] {
+            let path = folder.path().join("given");
+            for file in files.iter().map(|file| path.join(file)) {
+                fs::create_dir_all(file.parent().unwrap()).unwrap();
+                fs::write(file, b"").unwrap();
+            }
+            let told = told(&path);
+            assert!(
+                told.contains(&format!("given: got {what}, expected a measurement")),
+                "{files:?}: {told}"
+            );
+            fs::remove_dir_all(path).unwrap();
+        }
+        let empty = folder.path().join("empty");
+        assert!(other(&empty).unwrap().is_none());
+        fs::create_dir(&empty).unwrap();
+        fs::write(empty.join(".zarr.json.tmp-host-1-1"), b"").unwrap();
+        fs::write(empty.join(".lock"), b"").unwrap();
+        assert!(other(&empty).unwrap().is_none());
+    }
+
+    #[test]
+    fn what_is_zarr_and_not_ours_is_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let group = folder.path().join("store");
+        fs::create_dir_all(group.join("array")).unwrap();
+        let named = |path: &Path| foreign(path).unwrap().unexpected(path, &[model::KIND]).to_string();
+        fs::write(group.join("array/zarr.json"), r#"{"node_type": "array"}"#).unwrap();
+        assert!(named(&group.join("array")).contains("got a Zarr array, expected a model"));
+        fs::write(group.join("zarr.json"), r#"{"node_type": "group"}"#).unwrap();
+        assert!(named(&group.join("array")).contains("got an array within a store"));
+        assert!(named(&group).contains("got a Zarr group without the attribute btfkit"));
+    }
+}

@@ -378,6 +378,8 @@ fn every_damaged_or_exchanged_chunk_is_found() {
         let store = copy.place(name);
         let mut files = tree_names(&store);
         files.retain(|path| path.extension().is_none_or(|ending| ending == "png"));
+        // Where the origin of a store lies is held against what lies there, and is no part of the store.
+        files.retain(|path| !path.to_string_lossy().ends_with("-path"));
         files.sort();
         let all: Vec<Vec<u8>> = files.iter().map(|file| std::fs::read(file).unwrap()).collect();
         let mut missed = Vec::new();

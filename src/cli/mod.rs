@@ -134,14 +134,16 @@ enum Command {
 
 /// Names of the arguments that a command was given.
 fn given(matches: &clap::ArgMatches) -> Vec<String> {
-    let Some((_, command)) = matches.subcommand() else { return Vec::new() };
-    let names = command.ids().map(clap::Id::as_str);
-    let given = names.filter(|name| {
-        // Groups are among them, too.
-        matches!(command.try_contains_id(name), Ok(true))
-            && command.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
-    });
-    given.map(str::to_owned).collect()
+    let Some((name, found)) = matches.subcommand() else { return Vec::new() };
+    let command = help::command();
+    // Groups are among the names that were found, too.
+    let arguments = command.find_subcommand(name).into_iter().flat_map(clap::Command::get_arguments);
+    let names = arguments.map(|argument| argument.get_id().as_str());
+    let is_given = |name: &&str| {
+        matches!(found.try_contains_id(name), Ok(true))
+            && found.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
+    };
+    names.filter(is_given).map(str::to_owned).collect()
 }
 
 /// Runs the program.

@@ -17,7 +17,7 @@ use super::mapped::{self, MappedFile};
 use crate::error::{Error, Result};
 
 const MAGIC: &[u8; 16] = b"btfkit enlarge 1";
-const NAME: &str = "enlarge-state";
+pub(super) const NAME: &str = "enlarge-state";
 const DIGEST_LENGTH: usize = 64;
 
 /// How far an enlargement is.

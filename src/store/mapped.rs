@@ -234,8 +234,32 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
 }
 
-/// Removes a folder, moved away first: at no time does a part of it look like something unfinished.
-pub(crate) fn remove_folder(path: &Path) -> Result<()> {
+/// Removes a folder that holds nothing but what `is_own` says of paths in it (and temporary files and locks), moved away
+/// first: at no time does a part of it look like something unfinished.
+///
+/// # Errors
+/// [`crate::Kind::Recipe`] where it holds a file of another's.
+pub(crate) fn remove_folder(path: &Path, is_own: impl Fn(&Path) -> bool) -> Result<()> {
+    let mut folders = vec![path.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).map_err(|error| Error::io("list", &folder, error))? {
+            let entry = entry.map_err(|error| Error::io("list", &folder, error))?;
+            let at = entry.path();
+            if is_temporary(&at) || super::is_lock(&at) {
+                continue;
+            }
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                folders.push(at);
+            } else if !at.strip_prefix(path).is_ok_and(&is_own) {
+                return Err(Error::recipe(format!(
+                    "{} is no part of {}, which is not replaced therefore",
+                    at.display(),
+                    path.display()
+                ))
+                .hint("move that file away, or choose another name for the result"));
+            }
+        }
+    }
     let old = temporary_name(path);
     let removed = fs::rename(path, &old).and_then(|()| fs::remove_dir_all(&old));
     removed.map_err(|error| Error::io("remove", path, error))

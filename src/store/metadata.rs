@@ -18,6 +18,9 @@ pub const FORMAT: u64 = 2;
 /// The oldest version that is read: without seals, checksums and angle coordinates.
 pub const OLDEST_FORMAT: u64 = 1;
 
+/// The file of metadata of a group or an array.
+pub(crate) const FILE: &str = "zarr.json";
+
 /// Largest file of metadata that is read.
 const LIMIT_BYTES: u64 = 16 << 20;
 

@@ -280,7 +280,13 @@ impl Store {
         if !is_another()? {
             return Ok(());
         }
-        mapped::remove_folder(&self.path)
+        mapped::remove_folder(&self.path, |path| {
+            let is = |name: &str| path.file_name().is_some_and(|file| file == name);
+            // Chunks lie in a folder `c` of their array.
+            is(metadata::FILE)
+                || path.components().any(|part| part.as_os_str() == "c")
+                || [enlarge_state::NAME, origin::MODEL, origin::MEASUREMENT].into_iter().any(is)
+        })
     }
 
     /// The kind that a root names, however damaged its other attributes are.

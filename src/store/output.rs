@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use super::mapped::{self, MappedFile, Temporary, folder_of, open, write_file};
+use super::metadata;
 use crate::error::{Error, Kind, Result};
 
 /// Buffer of a file that is written front to back.
@@ -207,8 +208,25 @@ pub fn write_whole(
     prepare(path, existing, write)?.publish()
 }
 
+/// Refuses a place inside of a store, which a result would damage.
+///
+/// # Errors
+/// [`Kind::Usage`], with the store.
+pub fn expect_outside_stores(path: &Path) -> Result<()> {
+    let folder = folder_of(path);
+    let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    match real.ancestors().find(|folder| folder.join(metadata::FILE).is_file()) {
+        None => Ok(()),
+        Some(store) => {
+            Err(Error::usage(format!("{} would lie inside of the store {}", path.display(), store.display()))
+                .hint("choose a place outside of it"))
+        }
+    }
+}
+
 /// A file beside `path` that `write` has filled.
 fn written(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result<Temporary> {
+    expect_outside_stores(path)?;
     let failed = |error| Error::io("write", path, error);
     fs::create_dir_all(folder_of(path)).map_err(failed)?;
     Temporary::sweep_beside(path);
@@ -341,6 +359,7 @@ pub fn write_whole_folder(
         write(&found)?;
         return if found.holds_all_of(path)? { Ok(Made::Found) } else { Err(different_folder(path)) };
     }
+    expect_outside_stores(path)?;
     Temporary::sweep_beside(path);
     let mut temporary = Temporary::folder(path).map_err(failed)?;
     let filled = folder(temporary.path(), false);

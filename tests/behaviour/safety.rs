@@ -122,7 +122,7 @@ fn an_import_with_another_reading_is_refused_and_shards_of_two_do_not_mix() {
     succeed(&mut analyse(&model, &[]));
     succeed(&mut import(&["--cosine", "excluded", "--force"]));
     let told = fail(&mut analyse(&model, &[]), 65);
-    assert!(told.contains("measurement was"), "{told}");
+    assert!(told.contains("is not what") && told.contains("imported anew"), "{told}");
     fail(btf().arg("compare").args([&model, &store]), 65);
     succeed(&mut analyse(&model, &["--force"]));
     let fresh = folder.path().join("fresh.model.zarr");
@@ -316,6 +316,67 @@ fn a_pipe_among_the_files_of_a_result_is_never_waited_for() {
         limited.args(["60", env!("CARGO_BIN_EXE_btf")]).args(again.get_args()).stderr(Stdio::null());
         ended(&mut limited);
     }
+}
+
+#[test]
+fn files_of_others_in_a_store_or_a_pyramid_are_not_removed_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let [store, zoom] = ["store.zarr", "zoom.dzi"].map(|name| folder.path().join(name));
+    let tiles = folder.path().join("zoom_files");
+    let import = |white: &str| {
+        let mut command = btf();
+        command.arg("import").args([&fixture().archive(), &store]).args(["--white", white]);
+        command
+    };
+    let export = |exposure: &str| {
+        let mut command = btf();
+        command.arg("export").args([&fixture().measurement(), &zoom]).args(["--exposure", exposure]);
+        command
+    };
+    succeed(&mut import("1"));
+    succeed(&mut export("1"));
+    for (place, again) in [
+        (&store, &import as &dyn Fn(&str) -> Command),
+        (&store.join("reflectance"), &import),
+        (&store.join("mine"), &import),
+        (&tiles, &export),
+        (&tiles.join("0"), &export),
+    ] {
+        let mine = place.join("notes.txt");
+        fs::create_dir_all(place).unwrap();
+        fs::write(&mine, b"mine").unwrap();
+        let told = fail(again("2").arg("--force"), 65);
+        assert!(told.contains("notes.txt is no part of"), "{told}");
+        assert_eq!(fs::read(&mine).unwrap(), b"mine");
+        fs::remove_file(&mine).unwrap();
+    }
+    succeed(import("2").arg("--force"));
+    succeed(export("2").arg("--force"));
+}
+
+#[test]
+fn no_result_lies_inside_of_a_store() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("store.zarr");
+    crate::fixture::copy(&fixture().measurement(), &store);
+    let before = tree(&store);
+    for place in ["picture.png", "reflectance/c/0/0/0/0/0.png", "new/deep.exr"] {
+        let told = fail(btf().arg("image").arg(&store).arg("--force").arg("--out").arg(store.join(place)), 2);
+        assert!(told.contains("inside of the store"), "{told}");
+    }
+    for (place, format) in [
+        ("a.npy", "npy"),
+        ("reflectance/c/0/0/0/0/0", "npy"),
+        ("pictures", "png"),
+        ("a.h5", "hdf5"),
+        ("a.btf", "dfmf"),
+    ] {
+        let mut export = btf();
+        export.arg("export").args([&store, &store.join(place)]).args(["--to", format, "--force"]);
+        fail(&mut export, 2);
+    }
+    fail(btf().arg("export").args([&store, &store.join("zoom.dzi")]), 2);
+    assert_eq!(tree(&store), before);
 }
 
 #[test]

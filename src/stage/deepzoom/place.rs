@@ -12,7 +12,7 @@ use super::Encoding;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use crate::store::mapped::{self, MappedFile, MappedStorage, Temporary};
-use crate::store::output::Existing;
+use crate::store::output::{Existing, expect_outside_stores};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::store::{FORMAT, Store, is_lock, metadata};
 
@@ -64,6 +64,7 @@ impl Place {
     /// # Errors
     /// [`crate::Kind::Recipe`] for another recipe's pyramid, [`crate::Kind::Input`] for other files.
     pub(super) fn check(&self, recipe: &Value, existing: Existing) -> Result<()> {
+        expect_outside_stores(&self.description)?;
         match self.compare(recipe) {
             Err(error) if existing == Existing::Replace && error.kind() == crate::Kind::Recipe => Ok(()),
             other => other,
@@ -161,7 +162,10 @@ impl Place {
                 _ => {}
             }
         }
-        mapped::remove_folder(&self.folder)
+        mapped::remove_folder(&self.folder, |path| {
+            let is_tile = path.extension().is_some_and(|ending| ending == "png" || ending == "jpg");
+            is_tile && path.components().count() == 2 || path == Path::new(STATE)
+        })
     }
 
     /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.

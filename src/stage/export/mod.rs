@@ -17,7 +17,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
-use crate::store::output::Made;
+use crate::store::output::{Made, expect_outside_stores};
 
 /// A view as it is read, turned into images, and encoded.
 const VIEW_COPIES: u64 = 4;
@@ -73,6 +73,7 @@ type Written = (Made, Vec<String>);
 /// # Errors
 /// A measurement that is not complete, or that the format cannot hold; [`crate::Kind::Recipe`] where other files are.
 pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
+    expect_outside_stores(&options.output)?;
     let views = measurement.description().views.len();
     let done = measurement.views_done();
     if done < views {

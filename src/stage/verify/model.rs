@@ -9,6 +9,7 @@ use crate::run::progress::Counted;
 use crate::stage::{cluster, normals};
 use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::{KIND, Model, Stage};
+use crate::words::counted;
 
 /// Reads all of a model.
 pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
@@ -62,6 +63,10 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             report.keep("index", model.index())?;
             report.keep("centres", model.centres())?;
             report.keep("representative_texel", model.representative_texels())?;
+            let clusters = report.keep("index", model.clusters())?.unwrap_or_default() as u64;
+            let distances = format!("verifying the distances of {}", counted(clusters, "cluster"));
+            // As they are read and as they are packed.
+            context.require(&distances, clusters * clusters * 8)?;
             report.keep("distance", model.distance())?;
             for clusters in report.keep("representatives", model.representative_chunks())?.unwrap_or_default()
             {

@@ -24,7 +24,7 @@ use crate::run::{Context, recipe};
 use crate::shape::{Size, Window};
 use crate::store::checksums::DIGITS;
 use crate::store::codec::{Chain, chunk_codecs};
-use crate::store::{Array, Layout, Lock, Named, Store, directions};
+use crate::store::{Array, Layout, Lock, Named, Store, directions, mapped};
 use crate::views::Views;
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
@@ -308,11 +308,11 @@ impl Measurement {
     /// Whether something that is no file has the name of a shard of a view.
     pub(crate) fn obstructed(&self, view: usize) -> bool {
         let arrays = [SampleArray::Reflectance, SampleArray::Luminance];
-        self.windows(self.side).any(|window| {
-            arrays.iter().any(|&array| {
-                let path = self.shard_path(array, view, window);
-                path.symlink_metadata().is_ok() && !path.is_file()
-            })
+        let origin = Window { y: 0, x: 0, size: Size { height: 1, width: 1 } };
+        arrays.iter().any(|&array| {
+            let depth = if array == SampleArray::Reflectance { 4 } else { 3 };
+            let first = self.shard_path(array, view, origin);
+            first.ancestors().nth(depth).is_some_and(|folder| holds_no_file(folder, depth))
         })
     }
 
@@ -322,6 +322,18 @@ impl Measurement {
         let across = width.div_ceil(side) as u64;
         (0..height.div_ceil(side) as u64).flat_map(move |sy| (0..across).map(move |sx| (sy, sx)))
     }
+}
+
+/// Whether anything but a file lies `depth` folders below a folder. Only what is there is looked at: a store may claim
+/// more shards than can be counted.
+fn holds_no_file(folder: &Path, depth: usize) -> bool {
+    std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| {
+        let path = entry.path();
+        match depth {
+            0 | 1 => !mapped::is_temporary(&path) && !path.is_file(),
+            _ => path.is_dir() && holds_no_file(&path, depth - 1),
+        }
+    })
 }
 
 impl Views for Measurement {

@@ -24,8 +24,9 @@ pub(super) struct SceneArgs {
     #[arg(long, default_value_t = 1.0, value_parser = number::exposure)]
     pub(super) exposure: f64,
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
-    #[arg(long, value_enum, default_value = "model")]
-    values: ValuesName,
+    /// [default: model]
+    #[arg(long, value_enum)]
+    values: Option<ValuesName>,
     /// The measurement; implies --values measured [default: where it lay when the model was made; beside the
     /// model or in the current folder, without .model in its name]
     #[arg(long)]
@@ -60,8 +61,8 @@ impl SceneArgs {
             model: self.model.clone(),
             subject,
             values: match (self.values, &self.measurement) {
-                (ValuesName::Model, None) => Values::Model,
-                (ValuesName::Measured, _) | (_, Some(_)) => Values::Measured(self.measurement.clone()),
+                (Some(ValuesName::Model), _) | (None, None) => Values::Model,
+                _ => Values::Measured(self.measurement.clone()),
             },
             plane: self.plane.then(|| PlaneOptions {
                 seed: self.seed,

@@ -109,10 +109,10 @@ pub fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 /// Copies a store, to be harmed or moved.
 pub fn copy(from: &Path, to: &Path) {
-    for (name, bytes) in tree(from) {
-        let to = to.join(name);
+    for path in tree_names(from) {
+        let to = to.join(path.strip_prefix(from).unwrap());
         std::fs::create_dir_all(to.parent().unwrap()).unwrap();
-        std::fs::write(to, bytes).unwrap();
+        std::fs::copy(path, to).unwrap();
     }
 }
 

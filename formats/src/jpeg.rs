@@ -3,9 +3,11 @@
 //! Decoders are built to show what they can of a damaged picture; a measurement wants the opposite. So a
 //! file is walked marker by marker first and refused unless it ends with an EOI marker, every coefficient of
 //! every component was sent to full precision, restart markers are all there, and its scans have enough
-//! bytes for the size that the header claims. Only then are pixels decoded, in the decoder's strict mode.
+//! bytes for the size that the header claims. Only then are pixels decoded, in the decoder's strict mode, and an end
+//! of the data before that of the picture is found there.
 //!
-//! What this cannot see: bytes changed inside a scan that still decode. A zip's CRC-32 does.
+//! What this cannot see: bytes changed or left out inside a scan that still decode, and rows that the header does not
+//! claim. A zip's CRC-32 does.
 
 mod decode;
 mod encode;

@@ -42,14 +42,15 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     let picture = picture.as_ref();
     let header = walked.header;
     let bytes: Cow<'_, [u8]> = match walked.arrangement {
-        Arrangement::Ordinary => Cow::Borrowed(picture),
+        Arrangement::Ordinary => Cow::Owned(ended_by_no_code(picture)),
         Arrangement::OneComponent(at) => {
-            let mut plain = picture.to_vec();
+            let mut plain = ended_by_no_code(picture);
             if let Some(factors) = plain.get_mut(at) {
                 *factors = 0x11;
             }
             Cow::Owned(plain)
         }
+        // Read to the last bit as its scans are put together.
         Arrangement::ScatteredScans(mut grid) => {
             if let Some((id, _)) =
                 grid.components.first_mut().filter(|_| !walked.rgb && !walked.red_ids.is_empty())
@@ -78,6 +79,17 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         ));
     }
     Ok(Image { width: header.width, height: header.height, channels: header.channels, samples })
+}
+
+/// Data of bits that are all set, which is never a code of a Huffman table (T.81, annex C); as many as a decoder reads
+/// before it looks for a code.
+const NO_CODE: [[u8; 2]; 16] = [[0xFF, 0]; 16];
+
+/// The picture with [`NO_CODE`] before the marker that ends it. Where data are missing, the decoder would go on with
+/// zeros, which are the codes of something; now it finds that there is no code.
+fn ended_by_no_code(picture: &[u8]) -> Vec<u8> {
+    let (scans, end) = picture.split_at(picture.len().saturating_sub(2));
+    [scans, NO_CODE.as_flattened(), end].concat()
 }
 
 /// An Adobe segment that says of three components that they are red, green and blue.

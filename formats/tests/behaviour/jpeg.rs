@@ -109,6 +109,26 @@ fn arguments_that_cannot_be_encoded_are_refused() {
 }
 
 #[test]
+fn a_scan_that_is_cut_is_noticed_even_if_the_end_marker_is_there() {
+    for (channels, options, scans) in [
+        (1, options(90, false, Chroma::Full), 1),
+        (3, options(90, false, Chroma::Half), 1),
+        (3, options(100, false, Chroma::Full), 1),
+        (3, EncodeOptions::UBO2003, 12),
+    ] {
+        let whole = jpeg_of(40, 24, channels, &options);
+        decode(&whole, &Limits::default()).unwrap();
+        let (start, end) = (after_marker(&whole, 0xDA, scans - 1) + 12, whole.len() - 2);
+        // The last byte may hold nothing but bits that fill it, and the codes of the last block.
+        for cut in (start..end - 3).filter(|&cut| whole[cut - 1] != 0xFF) {
+            let bytes = [&whole[..cut], &[0xFF, 0xD9]].concat();
+            let ended = decode(&bytes, &Limits::default());
+            assert!(ended.is_err(), "{options:?}: {} of {} bytes", cut - start, end - start);
+        }
+    }
+}
+
+#[test]
 fn what_follows_the_end_is_not_the_picture() {
     for options in [EncodeOptions::UBO2003, options(90, false, Chroma::Half)] {
         let whole = jpeg_of(16, 16, 3, &options);

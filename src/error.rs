@@ -81,7 +81,8 @@ impl Error {
         Self::new(Kind::Stopped, "stopped on request").hint("run the same command again to go on")
     }
 
-    /// The operating system refused `action` on `path`: [`Kind::Io`], or [`Kind::Missing`] where there is nothing to read.
+    /// The operating system refused `action` on `path`: [`Kind::Io`], or [`Kind::Missing`] where there is nothing to
+    /// read.
     pub fn io(action: &str, path: &Path, source: std::io::Error) -> Self {
         let reading = matches!(action, "read" | "list" | "open");
         let kind = match source.kind() {
@@ -176,7 +177,8 @@ impl From<btfkit_formats::Error> for Error {
     }
 }
 
-/// Whether the operating system lets nobody, or not this user, do it: a file system that is read-only, or no permission.
+/// Whether the operating system lets nobody, or not this user, do it: a file system that is read-only, or no
+/// permission.
 pub(crate) fn is_denied(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied)
 }

@@ -181,8 +181,8 @@ const LETTERS_IN_NUMBERS: [char; 6] = ['p', 'P', 'd', 'D', 'e', 'E'];
 const BETWEEN_NUMBERS: &str = "_- \t=+()[]{}<>#@~&%/\\";
 
 /// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by
-/// half: `7,5`, `7p5`, `7d5`, `4.5e+01`, `1.2.3`. Any mark counts that does not stand between numbers (the world has more decimal
-/// points than can be listed), and digits of any script.
+/// half: `7,5`, `7p5`, `7d5`, `4.5e+01`, `1.2.3`. Any mark counts that does not stand between numbers (the world has
+/// more decimal points than can be listed), and digits of any script.
 pub(crate) fn goes_on(rest: &str) -> bool {
     let digit = |c: char| c.is_numeric();
     let mut chars = rest.chars();

@@ -88,11 +88,11 @@ pub struct PictureHeader {
     pub linear: bool,
     /// A Radiance picture whose resolution line names X first, so that [`HdrOrientation`] matters.
     pub scanlines_are_columns: bool,
-    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF, XMP): 1..=8, 1 being as stored
-    /// and what is meant where it says nothing. Samples are handed out as stored.
+    /// How the picture asks a viewer to turn it (Exif in JPEG, `eXIf` in PNG, tag 274 in TIFF, XMP): 1..=8, 1 being as
+    /// stored and what is meant where it says nothing. Samples are handed out as stored.
     pub orientation: u8,
-    /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an ICC
-    /// profile, a gamma, code points (JPEG, PNG, TIFF).
+    /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an
+    /// ICC profile, a gamma, code points (JPEG, PNG, TIFF).
     pub profile: Option<String>,
     /// The one layer of an OpenEXR picture whose channels are all in it.
     pub layer: Option<String>,

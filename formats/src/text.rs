@@ -28,12 +28,15 @@ pub fn utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>> {
     };
     match bytes {
         [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => refused("a text in UTF-32"),
-        [rest @ .., DOS_END] => utf8(rest),
-        [0xEF, 0xBB, 0xBF, rest @ ..] => Ok(Cow::Borrowed(rest)),
         [0xFF, 0xFE, rest @ ..] => utf16(rest, u16::from_le_bytes),
         [0xFE, 0xFF, rest @ ..] => utf16(rest, u16::from_be_bytes),
         [first, second, ..] if *first == 0 || *second == 0 => refused("a text in UTF-16 without its mark"),
-        _ => Ok(Cow::Borrowed(bytes)),
+        _ => {
+            let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+            let length =
+                text.iter().rposition(|&byte| byte != DOS_END).map_or(0, |last| last.saturating_add(1));
+            Ok(Cow::Borrowed(text.get(..length).unwrap_or(text)))
+        }
     }
 }
 
@@ -76,6 +79,10 @@ mod tests {
             assert!(error.to_string().contains(words), "{error}");
         }
         assert_eq!(&*utf8(b"ab\x1A\x1A").unwrap(), b"ab");
+        assert_eq!(&*utf8(b"\xEF\xBB\xBFab\x1A").unwrap(), b"ab");
+        assert_eq!(&*utf8(&vec![DOS_END; 8 << 20]).unwrap(), b"");
+        // The last byte of a character is none.
+        assert_eq!(&*utf8(b"\xFF\xFEa\0\x05\x1A").unwrap(), "a\u{1A05}".as_bytes());
         // A name in another encoding is the reader's to judge.
         assert_eq!(&*utf8(b"\xFCx").unwrap(), b"\xFCx");
         assert!(utf8(b"").unwrap().is_empty());

@@ -63,9 +63,9 @@ enum Place {
 }
 
 impl Files {
-    /// Lists folders, zips and plain files, in the order given. Zips in a folder are looked into, what is hidden is not. A light
-    /// list stands for the pictures beside it or, if there are none, in the folder above (a project has its lists in a folder
-    /// of their own).
+    /// Lists folders, zips and plain files, in the order given. Zips in a folder are looked into, what is hidden is
+    /// not. A light list stands for the pictures beside it or, if there are none, in the folder above (a project has
+    /// its lists in a folder of their own).
     ///
     /// # Errors
     /// Says where a zip is damaged, and what is no file. A file that stands alone and is of a known format that is not read is
@@ -293,8 +293,8 @@ pub(super) fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(head)
 }
 
-/// Files below a folder, sorted by path, and how many hidden ones were left out. Links to files are followed, links to folders are
-/// not.
+/// Files below a folder, sorted by path, and how many hidden ones were left out. Links to files are followed, links to
+/// folders are not.
 fn list_folder(root: &Path) -> Result<(Vec<PathBuf>, usize)> {
     let mut hidden = 0;
     let mut files = Vec::new();

@@ -1,10 +1,9 @@
 //! Which file a list means: lists are written on other machines, for other folders, before files are renamed.
 //!
-//! A name in a list means the file that is called so. If there is none, it means the one that differs in the Unicode form
-//! only (macOS takes letters apart), then in case, then in the ending, where both are those of pictures (a list for raw
-//! files, and the JPEGs of them).
-//! Of several files of the name, the one with the longest common end of the path is meant, then the one beside the list. What is
-//! still ambiguous is refused.
+//! A name in a list means the file that is called so. If there is none, it means the one that differs in the Unicode
+//! form only (macOS takes letters apart), then in case, then in the ending, where both are those of pictures (a list
+//! for raw files, and the JPEGs of them). Of several files of the name, the one with the longest common end of the path
+//! is meant, then the one beside the list. What is still ambiguous is refused.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -23,8 +22,8 @@ const OTHER_PICTURES: [&str; 31] = [
     "srw", "webp",
 ];
 
-/// Whether a name ends as one of a picture does. (`foo.v2` does not, nor does `p0.png 0.5`: what follows the point there is
-/// part of the name, without which it may mean another file.)
+/// Whether a name ends as one of a picture does. (`foo.v2` does not, nor does `p0.png 0.5`: what follows the point
+/// there is part of the name, without which it may mean another file.)
 fn is_any_picture(name: &str) -> bool {
     let other =
         |(_, ending): (&str, &str)| OTHER_PICTURES.iter().any(|known| known.eq_ignore_ascii_case(ending));

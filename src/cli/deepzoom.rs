@@ -51,30 +51,9 @@ impl Deepzoom {
         self.deepzoom || output.extension().is_some_and(|ending| ending == "dzi")
     }
 
-    /// Hands the names of the options that matter to `check`.
-    pub(super) fn expect_used(&self, check: impl Fn(&[&str]) -> Result<()>) -> Result<()> {
-        let mut used = vec![
-            "deepzoom",
-            "light",
-            "view",
-            "window",
-            "exposure",
-            "values",
-            "measurement",
-            "model",
-            "plane",
-            "seed",
-            "jitter",
-            "format",
-            "tile_size",
-            "overlap",
-            "dry_run",
-            "json",
-        ];
-        if matches!(self.format, TileFormat::Jpeg) {
-            used.push("quality");
-        }
-        check(&used)
+    /// Whether tiles are JPEGs, which have a quality.
+    pub(super) fn is_jpeg(&self) -> bool {
+        matches!(self.format, TileFormat::Jpeg)
     }
 
     pub(super) fn run(

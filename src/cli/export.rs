@@ -62,13 +62,8 @@ impl Export {
     }
 
     /// Refuses options that would change nothing.
-    fn expect_used(&self, what: &str, used: &[&str]) -> Result<()> {
-        let general = ["store", "output", "to", "threads", "memory", "progress", "quiet", "force"];
-        let idle = self
-            .given
-            .iter()
-            .find(|name| !general.contains(&name.as_str()) && !used.contains(&name.as_str()));
-        match idle {
+    fn refuse_idle(&self, what: &str, is_idle: impl Fn(&str) -> bool) -> Result<()> {
+        match self.given.iter().find(|name| is_idle(name)) {
             None => Ok(()),
             Some(name) => {
                 Err(Error::usage(format!("--{} changes nothing in {what}", name.replace('_', "-")))
@@ -79,7 +74,8 @@ impl Export {
 
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
         if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
-            self.deepzoom.expect_used(|used| self.expect_used("a Deep Zoom pyramid like this one", used))?;
+            let is_idle = |name: &str| name == "rank" || name == "quality" && !self.deepzoom.is_jpeg();
+            self.refuse_idle("a Deep Zoom pyramid like this one", is_idle)?;
             return self.deepzoom.run(&self.store, &self.output, self.quality, context, tell);
         }
         let format = match self.to {
@@ -95,19 +91,24 @@ impl Export {
                     .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
             })?,
         };
-        if self.to.is_some() && self.output.extension().is_some_and(|ending| ending == "dzi") {
+        if self.output.extension().is_some_and(|ending| ending == "dzi") {
             return Err(Error::usage(
                 "--to asks for another format than the Deep Zoom pyramid that .dzi stands for",
             )
             .hint("leave out --to, or name the result otherwise"));
         }
-        match format {
-            Format::Ubo2003 => self.expect_used("a zip of JPEGs", &["quality"]),
-            Format::Dfmf | Format::Fmf => self.expect_used("a Bonn container", &["rank"]),
-            Format::Exr | Format::Png => self.expect_used("a folder of pictures", &[]),
-            Format::Npy => self.expect_used("a numpy array", &[]),
-            Format::Hdf5 => self.expect_used("an HDF5 file", &[]),
-        }?;
+        let (what, used) = match format {
+            Format::Ubo2003 => ("a zip of JPEGs", "quality"),
+            Format::Dfmf | Format::Fmf => ("a Bonn container", "rank"),
+            Format::Exr | Format::Png => ("a folder of pictures", ""),
+            Format::Npy => ("a numpy array", ""),
+            Format::Hdf5 => ("an HDF5 file", ""),
+        };
+        let zoom = Deepzoom::augment_args(clap::Command::new(""));
+        self.refuse_idle(what, |name| {
+            ["rank", "quality"].contains(&name) && name != used
+                || zoom.get_arguments().any(|argument| argument.get_id() == name)
+        })?;
         let measurement = Measurement::open(&self.store)?;
         let options = export::Options {
             output: self.output.clone(),

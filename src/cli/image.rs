@@ -25,8 +25,8 @@ from the three views and three lights around them.")]
 pub(super) struct Image {
     /// A measurement, a model or an enlarged index
     source: PathBuf,
-    /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has at
-    /// most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory
+    /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has
+    /// at most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory
     #[arg(long, short)]
     out: PathBuf,
     /// Bits of a display value: 16 for PNG and TIFF

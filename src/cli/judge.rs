@@ -36,7 +36,8 @@ pub(super) struct Judge {
     /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
     #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the directions]
+    /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the
+    /// directions]
     #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]

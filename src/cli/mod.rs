@@ -149,11 +149,14 @@ fn given(matches: &clap::ArgMatches) -> Vec<String> {
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
     let matches = help::command().try_get_matches();
-    let cli = matches.and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, given(&matches))));
-    let (mut cli, given) = cli.unwrap_or_else(|error| help::explained(error).exit());
-    if let Command::Export(export) = &mut cli.command {
-        export.note_given(given);
-    }
+    let cli = matches.and_then(|matches| {
+        let mut cli = Cli::from_arg_matches(&matches)?;
+        if let Command::Export(export) = &mut cli.command {
+            export.note_given(given(&matches));
+        }
+        Ok(cli)
+    });
+    let cli = cli.unwrap_or_else(|error| help::explained(error).exit());
     let threads = cli.common.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,
@@ -223,7 +226,8 @@ fn explain_aborts(json: bool) {
         let _ = std::io::stderr().write_all(told.as_bytes());
         signal_hook::low_level::exit(1);
     };
-    // SAFETY: standard error has no buffer, so that nothing is allocated; whoever else holds it goes on and releases it.
+    // SAFETY: standard error has no buffer, so that nothing is allocated; whoever else holds it goes on and releases
+    // it.
     let _ = unsafe { signal_hook::low_level::register(signal_hook::consts::SIGABRT, explain) };
 }
 

@@ -24,8 +24,8 @@ const DEFLATE_LEVEL: u8 = 1;
 /// The file within its temporary folder.
 const FILE: &str = "file.h5";
 
-/// An HDF5 file that is being written. It appears under its name with [`Writer::finish`], whole; dropped before, it leaves
-/// nothing.
+/// An HDF5 file that is being written. It appears under its name with [`Writer::finish`], whole; dropped before, it
+/// leaves nothing.
 pub struct Writer {
     path: PathBuf,
     existing: Existing,
@@ -40,8 +40,8 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Begins a file. `attributes` are those of the measurement store beside what `contents` says: `white`, `version`, `recipe`.
-    /// Remarks and assumptions of `contents` are not written.
+    /// Begins a file. `attributes` are those of the measurement store beside what `contents` says: `white`, `version`,
+    /// `recipe`. Remarks and assumptions of `contents` are not written.
     ///
     /// # Errors
     /// [`crate::Kind::Usage`] for contents without views, lights, channels or texels; [`crate::Kind::Io`] where nothing can
@@ -144,7 +144,8 @@ impl Writer {
         Ok(dataset)
     }
 
-    /// Writes one view: samples `[y, x, light, channel]`, and its L* codes `[y, x, light]`, either for all views or for none.
+    /// Writes one view: samples `[y, x, light, channel]`, and its L* codes `[y, x, light]`, either for all views or for
+    /// none.
     ///
     /// # Errors
     /// [`crate::Kind::Internal`] for samples of another type or number than the contents say; [`crate::Kind::Io`].

@@ -12,32 +12,17 @@ use exr::meta::header::Header;
 use crate::error::{Error, Result};
 use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
 use crate::shape::Size;
-use crate::store::output::{self, Existing, Made, Ready, prepare_seeking};
+use crate::store::output::{self, Existing, Ready, prepare_seeking};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
 
-/// Writes a picture file from rows that `row` gives from the top down; it appears whole or not at all.
+/// Writes a picture file from rows that `row` gives from the top down; it gets its name when it is published.
 ///
 /// PNG and EXR are written as the rows come; of other formats all rows are gathered first.
 ///
 /// # Errors
 /// A size that the format does not take, those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
-pub fn write(
-    path: &Path,
-    encoding: Encoding,
-    size: Size,
-    meaning: Meaning,
-    existing: Existing,
-    row: impl FnMut(&mut [[f32; 3]]) -> Result<()>,
-) -> Result<Made> {
-    prepare(path, encoding, size, meaning, existing, row)?.publish()
-}
-
-/// As [`write`], without its name yet.
-///
-/// # Errors
-/// As [`write`].
 pub fn prepare(
     path: &Path,
     encoding: Encoding,

@@ -70,8 +70,8 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
         // Of what was made before only the digest is known.
         (Some(old), Some(new)) if is_digest(old) && is_digest(new) => format!(
             "its {place} was made anew since, or is another one (digest {}, now {})",
-            &old[..SHOWN],
-            &new[..SHOWN]
+            shortened(old),
+            shortened(new)
         ),
         _ => format!("{place} was {}, now {}", shown(old), shown(new)),
     })
@@ -82,8 +82,10 @@ fn shown(value: &Value) -> String {
     if value.is_null() { "not given".to_owned() } else { value.to_string() }
 }
 
-/// Characters of a digest that are shown.
-const SHOWN: usize = 12;
+/// A digest as messages show it.
+pub(crate) fn shortened(digest: &str) -> &str {
+    digest.get(..12).unwrap_or(digest)
+}
 
 fn is_digest(text: &str) -> bool {
     text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit())

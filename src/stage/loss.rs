@@ -1,5 +1,5 @@
-//! What a format cannot hold of the values that are put into it, said by everything that converts: pictures, pyramids and
-//! archives in the formats of others.
+//! What a format cannot hold of the values that are put into it, said by everything that converts: pictures, pyramids
+//! and archives in the formats of others.
 
 use std::sync::Mutex;
 

@@ -255,8 +255,8 @@ impl Enlarged {
         self.store.is_consolidated(&names)
     }
 
-    /// The folders of rows of shards that are not those that were written, though each shard may be intact; none where no
-    /// checksums are kept.
+    /// The folders of rows of shards that are not those that were written, though each shard may be intact; none where
+    /// no checksums are kept.
     ///
     /// # Errors
     /// Where a shard is missing, or its index is damaged.
@@ -350,8 +350,8 @@ impl Enlarged {
             && has(&self.normals, &[place[0], place[1], 0])
     }
 
-    /// Rows and columns of the shards of the index that lie on the disk, in order: whatever size is claimed, no others are
-    /// looked for.
+    /// Rows and columns of the shards of the index that lie on the disk, in order: whatever size is claimed, no others
+    /// are looked for.
     pub fn shards_found(&self) -> Vec<[usize; 2]> {
         let Size { height, width } = self.shards();
         let listed = |folder: &Path, end: usize| -> Vec<usize> {

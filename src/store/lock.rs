@@ -1,8 +1,8 @@
 //! Advisory locks that keep two processes from mixing their recipes in one store.
 //!
-//! A lock is a file beside what it guards, locked by `flock` and gone when it is released; in it stands who holds it. No
-//! result depends on them: shards are deterministic and appear whole. Where a file system has no locks the work goes on
-//! without.
+//! A lock is a file beside what it guards, locked by `flock` and gone when it is released; in it stands who holds it.
+//! No result depends on them: shards are deterministic and appear whole. Where a file system has no locks the work goes
+//! on without.
 
 use std::fs::{File, TryLockError};
 use std::io::{Read, Write};
@@ -84,7 +84,8 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // Removed while it is still held: whoever opened it before finds that it is not there any more, and tries again.
+        // Removed while it is still held: whoever opened it before finds that it is not there any more, and tries
+        // again.
         if let Some((place, file)) = &self.held {
             // Of a lock that is shared the last one removes the file.
             let alone = file.try_lock().is_ok();

@@ -24,9 +24,9 @@ use zarrs_storage::{
 
 use crate::error::{Error, Result};
 
-/// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`. Its writer holds an advisory lock on it: one that can be locked is
-/// abandoned, whatever became of the process and wherever it ran. (Process ids tell nothing: containers share a host's
-/// name and have lists of processes of their own.)
+/// Marks a temporary file: `.NAME.tmp-HOST-PID-RANDOM`. Its writer holds an advisory lock on it: one that can be locked
+/// is abandoned, whatever became of the process and wherever it ran. (Process ids tell nothing: containers share a
+/// host's name and have lists of processes of their own.)
 const TEMPORARY: &str = ".tmp-";
 
 /// Bytes that the system maps around a page that is touched.
@@ -183,7 +183,8 @@ impl Temporary {
         File::open(folder_of(path))?.sync_all()
     }
 
-    /// Puts a folder in the place of another one. Where a process that does the same was faster, the name is taken again.
+    /// Puts a folder in the place of another one. Where a process that does the same was faster, the name is taken
+    /// again.
     pub(crate) fn replace_folder(&mut self, path: &Path) -> io::Result<()> {
         let old = temporary_name(path);
         let gone = |result: io::Result<()>| match result {
@@ -234,8 +235,8 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, bytes).map_err(|error| Error::io("write", path, error))
 }
 
-/// Removes a folder that holds nothing but what `is_own` says of paths in it (and temporary files and locks), moved away
-/// first: at no time does a part of it look like something unfinished.
+/// Removes a folder that holds nothing but what `is_own` says of paths in it (and temporary files and locks), moved
+/// away first: at no time does a part of it look like something unfinished.
 ///
 /// # Errors
 /// [`crate::Kind::Recipe`] where it holds a file of another's.

@@ -1,5 +1,5 @@
-//! Where the store lies that another one was made of (the model of an enlarged index, the measurement of a model): beside
-//! it under the name that is expected, or where a file in it says.
+//! Where the store lies that another one was made of (the model of an enlarged index, the measurement of a model):
+//! beside it under the name that is expected, or where a file in it says.
 //!
 //! The file holds the way from the folder of the store to its origin, so that both can be moved together. It is no part
 //! of what is made: the same store in another place has the same bytes in all other files.
@@ -20,8 +20,8 @@ pub(crate) const MEASUREMENT: &str = "measurement-path";
 /// The longest way that is read.
 const MOST_BYTES: u64 = 4096;
 
-/// Notes in a file of a store where its origin lies; nothing where that lies beside it under the name that is `expected`,
-/// or where there is no such way. A store that cannot be written to keeps what it says.
+/// Notes in a file of a store where its origin lies; nothing where that lies beside it under the name that is
+/// `expected`, or where there is no such way. A store that cannot be written to keeps what it says.
 ///
 /// # Errors
 /// Those of writing.

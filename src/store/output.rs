@@ -1,7 +1,7 @@
 //! Files and folders outside a store that appear whole or not at all, and that never replace what is there unasked.
 //!
-//! What exists already is compared while it is made again, byte by byte: the same is found done, anything else is refused
-//! at the first byte that differs. Only on request ([`Existing::Replace`]) a new one takes its place.
+//! What exists already is compared while it is made again, byte by byte: the same is found done, anything else is
+//! refused at the first byte that differs. Only on request ([`Existing::Replace`]) a new one takes its place.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -57,7 +57,8 @@ fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
 }
 
-/// What has this name, if it is anything but a file; a link is not followed, since a rename would put a file in its place.
+/// What has this name, if it is anything but a file; a link is not followed, since a rename would put a file in its
+/// place.
 fn special(path: &Path) -> Option<&'static str> {
     mapped::special(&path.symlink_metadata().ok()?)
 }
@@ -124,8 +125,8 @@ impl std::fmt::Display for Different {
 
 impl std::error::Error for Different {}
 
-/// A file that is written or found done, and gets its name by [`Ready::publish`]: of several that belong together none is
-/// published before all are ready.
+/// A file that is written or found done, and gets its name by [`Ready::publish`]: of several that belong together none
+/// is published before all are ready.
 #[must_use]
 pub struct Ready {
     path: PathBuf,
@@ -164,8 +165,8 @@ pub fn prepare(
     written(path, write).map(|temporary| ready(Some(temporary)))
 }
 
-/// As [`prepare`], for a `write` that goes back and changes what it wrote, so that only the end can be compared: the file
-/// is written under another name first.
+/// As [`prepare`], for a `write` that goes back and changes what it wrote, so that only the end can be compared: the
+/// file is written under another name first.
 ///
 /// # Errors
 /// As [`prepare`].
@@ -266,6 +267,17 @@ fn compare_files(made: &Path, path: &Path) -> Result<()> {
     compare(path, |output| io::copy(&mut made, output).map(|_| ()).map_err(failed))
 }
 
+/// Whether a file holds just these bytes; what is no file, or not there, does not.
+fn holds(path: &Path, bytes: &[u8]) -> Result<bool> {
+    match MappedFile::open(path) {
+        Ok(found) => Ok(found.as_ref() == bytes),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
+            Ok(false)
+        }
+        Err(error) => Err(Error::io("read", path, error)),
+    }
+}
+
 /// A folder that is filled, or compared with the one that is there.
 pub struct Folder {
     root: PathBuf,
@@ -281,31 +293,17 @@ impl Folder {
         if !self.compared {
             return write_file(&path, bytes);
         }
-        match MappedFile::open(&path) {
-            Ok(found) if found.as_ref() == bytes => Ok(()),
-            Ok(_) => Err(different_folder(&self.root)),
-            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {
-                Err(different_folder(&self.root))
-            }
-            Err(error) => Err(Error::io("read", &path, error)),
-        }
+        if holds(&path, bytes)? { Ok(()) } else { Err(different_folder(&self.root)) }
     }
 
     /// Whether every file that was put into this one lies in a folder too, the same to the byte.
     fn is_in(&self, folder: &Path) -> Result<bool> {
         let names = self.names.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         for name in names.iter() {
-            let (ours, theirs) = (self.root.join(name), folder.join(name));
+            let ours = self.root.join(name);
             let made = MappedFile::open(&ours).map_err(|error| Error::io("read", &ours, error))?;
-            match MappedFile::open(&theirs) {
-                Ok(found) if found.as_ref() == made.as_ref() => {}
-                Ok(_) => return Ok(false),
-                Err(error)
-                    if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) =>
-                {
-                    return Ok(false);
-                }
-                Err(error) => return Err(Error::io("read", &theirs, error)),
+            if !holds(&folder.join(name), made.as_ref())? {
+                return Ok(false);
             }
         }
         Ok(true)

@@ -1,7 +1,7 @@
 //! Reading arrays: boxes of them, out of chunks of known size.
 //!
-//! Nothing is allocated that the files do not hold: every chunk of a box must be there before the box is, and a chunk is
-//! decompressed to exactly the size that the layout gives it.
+//! Nothing is allocated that the files do not hold: every chunk of a box must be there before the box is, and a chunk
+//! is decompressed to exactly the size that the layout gives it.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -255,8 +255,8 @@ fn is_free(place: &str, to: Option<&Value>) -> bool {
     place == "/attributes/coordinates" || (place == "/attributes" && to.is_none_or(|to| *to == json!({})))
 }
 
-/// Changes every member of every metadata file of a store, one at a time. Of `each` changes one is used by all commands;
-/// of those of arrays one of `step` is made, another kind at every member.
+/// Changes every member of every metadata file of a store, one at a time. Of `each` changes one is used by all
+/// commands; of those of arrays one of `step` is made, another kind at every member.
 fn change_all(copy: &Copy, name: &str, each: usize, step: usize) -> usize {
     let store = copy.place(name);
     let files = tree_names(&store).into_iter().filter(|path| path.extension().is_some_and(|e| e == "json"));

@@ -41,14 +41,14 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     let picture = with_colours(bytes.get(..walked.length).unwrap_or(bytes), &walked);
     let picture = picture.as_ref();
     let header = walked.header;
-    let bytes: Cow<'_, [u8]> = match walked.arrangement {
-        Arrangement::Ordinary => Cow::Owned(ended_by_no_code(picture)),
+    let bytes = match walked.arrangement {
+        Arrangement::Ordinary => ended_by_no_code(picture),
         Arrangement::OneComponent(at) => {
             let mut plain = ended_by_no_code(picture);
             if let Some(factors) = plain.get_mut(at) {
                 *factors = 0x11;
             }
-            Cow::Owned(plain)
+            plain
         }
         // Read to the last bit as its scans are put together.
         Arrangement::ScatteredScans(mut grid) => {
@@ -57,7 +57,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
             {
                 *id = NO_RED;
             }
-            Cow::Owned(interleaved(picture, &grid)?)
+            interleaved(picture, &grid)?
         }
     };
     let colours = if header.channels == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
@@ -67,7 +67,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         .set_max_height(usize::from(u16::MAX))
         .jpeg_set_max_scans(usize::try_from(limits.max_scans_per_image).unwrap_or(usize::MAX))
         .jpeg_set_out_colorspace(colours);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_ref()), options);
+    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_slice()), options);
     let samples = decoder.decode().map_err(|e| undecodable(&e))?;
 
     let pixels = u64::from(header.width).saturating_mul(u64::from(header.height));

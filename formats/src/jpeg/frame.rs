@@ -338,8 +338,8 @@ fn common_factors(components: &[Component]) -> Sampling {
     Sampling { horizontal: common(|c| c.sampling.horizontal), vertical: common(|c| c.sampling.vertical) }
 }
 
-/// One component, or three the first of which has the most blocks, 1, 2 or 4 for each of another's. So are 4:4:4, 4:2:2,
-/// 4:4:0, 4:2:0, 4:1:1 and 4:1:0. Stranger samplings are where decoders differ.
+/// One component, or three the first of which has the most blocks, 1, 2 or 4 for each of another's. So are 4:4:4,
+/// 4:2:2, 4:4:0, 4:2:0, 4:1:1 and 4:1:0. Stranger samplings are where decoders differ.
 fn require_known_sampling(components: &[Component], progressive: bool) -> Result<()> {
     let both = |c: &Component| [c.sampling.horizontal, c.sampling.vertical];
     // Three blocks of each component are three times one; of a progressive file that is left to be said.

@@ -1,13 +1,13 @@
 //! OpenEXR: one flat part of half and float channels, in scan lines or tiles.
 //!
-//! The container is read here, strictly: every chunk of the offset table must be there, at its place, with a
-//! length that its pixels can come from. The crate `exr` decompresses one chunk at a time. (Its own reader sizes its tables by the
-//! header before it has seen that many bytes, takes the last of two attributes of one name, and goes on where
-//! the offset table is damaged.)
+//! The container is read here, strictly: every chunk of the offset table must be there, at its place, with a length
+//! that its pixels can come from. The crate `exr` decompresses one chunk at a time. (Its own reader sizes its tables by
+//! the header before it has seen that many bytes, takes the last of two attributes of one name, and goes on where the
+//! offset table is damaged.)
 //!
 //! The picture is the data window; the display window is ignored, so that whoever reads a set compares sizes.
-//! Chromaticities and white luminance are not applied. Refused: several parts or layers (a single one is the picture), deep data, mip maps, subsampled
-//! channels, HTJ2K.
+//! Chromaticities and white luminance are not applied. Refused: several parts or layers (a single one is the picture),
+//! deep data, mip maps, subsampled channels, HTJ2K.
 //!
 //! Source: "OpenEXR File Layout" of the Academy Software Foundation.
 

@@ -1,4 +1,5 @@
-//! How a picture asks to be turned before it is shown (TIFF 6.0, tag 274; Exif 2.3; PNG's eXIf; XMP's `tiff:Orientation`).
+//! How a picture asks to be turned before it is shown (TIFF 6.0, tag 274; Exif 2.3; PNG's eXIf; XMP's
+//! `tiff:Orientation`).
 //!
 //! Samples are handed out as stored, whatever is asked for: a camera that looks down writes what its sensor of
 //! gravity makes of that, and the lights' directions are of the picture as it was taken. The caller is told.

@@ -89,8 +89,8 @@ fn undecodable(error: &DecodingError) -> Error {
     Error::new(kind, format!("data that the PNG decoder refuses: {error}"), "a PNG that decodes")
 }
 
-/// Encodes a picture of one (grey) or three (colour) channels of 8 or 16 bits, without any statement about its transfer curve. The same
-/// picture gives the same bytes.
+/// Encodes a picture of one (grey) or three (colour) channels of 8 or 16 bits, without any statement about its transfer
+/// curve. The same picture gives the same bytes.
 ///
 /// # Errors
 /// [`ErrorKind::Argument`]: other numbers of channels, samples that are floats or not `height * width * channels`.

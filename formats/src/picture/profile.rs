@@ -1,5 +1,5 @@
-//! What a picture says of its colours, where that is not what integers are taken for: sRGB. Nothing of it is applied; the
-//! caller is told.
+//! What a picture says of its colours, where that is not what integers are taken for: sRGB. Nothing of it is applied;
+//! the caller is told.
 
 use super::tiff;
 use crate::reader::Reader;

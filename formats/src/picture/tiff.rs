@@ -1,9 +1,9 @@
 //! TIFF 6.0 and BigTIFF.
 //!
 //! Read are 8- and 16-bit integers and 16- and 32-bit floats, grey, RGB, or any number of channels without meaning
-//! (named C0, C1, ...), side by side or apart, in strips or tiles, uncompressed or by LZW, deflate or PackBits, with either
-//! predictor. Refused: several pictures in one file (smaller versions beside one do not matter), palettes, white-is-zero,
-//! CMYK, YCbCr and Lab, JPEG and fax inside a TIFF.
+//! (named C0, C1, ...), side by side or apart, in strips or tiles, uncompressed or by LZW, deflate or PackBits, with
+//! either predictor. Refused: several pictures in one file (smaller versions beside one do not matter), palettes,
+//! white-is-zero, CMYK, YCbCr and Lab, JPEG and fax inside a TIFF.
 //!
 //! The layout of the file and the predictors are read here, and crates unpack LZW and deflate. (The crate `tiff`
 //! multiplies what the directory says before it has held it against anything, refuses some valid LZW tiles at the edge

@@ -21,8 +21,8 @@ pub struct Lamp {
     /// Path inside the list's folder, parts separated by `/`; `None` in lists without names, whose lights
     /// belong to the sorted pictures of the folder.
     pub file: Option<String>,
-    /// All folders that the list names and the file, separated by `/`, without a drive and what `..` climbs out of: where a
-    /// set was moved from another machine, the longest end that is there decides. Empty in lists without names.
+    /// All folders that the list names and the file, separated by `/`, without a drive and what `..` climbs out of:
+    /// where a set was moved from another machine, the longest end that is there decides. Empty in lists without names.
     pub path: String,
     /// Direction to the light.
     pub light: Angles,
@@ -32,13 +32,13 @@ pub struct Lamp {
 
 /// Reads a light position list.
 ///
-/// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y
-/// z, the vector towards the light of any length: x right, y up, z to the camera. Fields are separated by
-/// spaces or tabs, lines end in LF, CRLF or CR. The text is UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal
-/// point or, all of them that have a fraction, a decimal comma. A name may be quoted. A count that is not there is a
-/// warning; one that is wrong is an error, as it tells of a list that is cut, or put together of two, which nothing else
-/// does. A second variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another
-/// machine) the last part counts, so a list never reaches out of its folder.
+/// The first line is the number of photographs; then one line each: file name (which may hold spaces) and x y z, the
+/// vector towards the light of any length: x right, y up, z to the camera. Fields are separated by spaces or tabs,
+/// lines end in LF, CRLF or CR. The text is UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal point or,
+/// all of them that have a fraction, a decimal comma. A name may be quoted. A count that is not there is a warning; one
+/// that is wrong is an error, as it tells of a list that is cut, or put together of two, which nothing else does. A
+/// second variant has no names. Of a name that is absolute, has a drive or climbs by `..` (a list from another machine)
+/// the last part counts, so a list never reaches out of its folder.
 ///
 /// # Errors
 /// [`ErrorKind::Malformed`], with the line: no light at all, another number of them than the first line says, a line that is none, a vector of no length or into the

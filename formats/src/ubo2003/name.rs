@@ -45,8 +45,8 @@ pub fn parse_name(path: &str) -> Option<ImageName> {
     })
 }
 
-/// Whether a picture's name has the labels, but a number that would be read by half: `tl7,5`, `tl7p5`, `tl7-5`, `tl7_5`,
-/// `tl4.5e+01`. Such a name is no image, and a caller does well not to pass over it.
+/// Whether a picture's name has the labels, but a number that would be read by half: `tl7,5`, `tl7p5`, `tl7-5`,
+/// `tl7_5`, `tl4.5e+01`. Such a name is no image, and a caller does well not to pass over it.
 pub fn half_read(path: &str) -> bool {
     let Some(stem) = picture_stem(path).map(base) else { return false };
     let labels = [*b"tl", *b"pl", *b"tv", *b"pv"];

@@ -1,7 +1,7 @@
 //! Exposure that jumps: of one light, one view, or one image.
 //!
-//! The mean of an image, its light's cosine divided out, is smooth in both directions, so neighbours predict it. A
-//! lamp or an exposure time that differed stands out under all views, one wrong image alone. A highlight stands out too, but
+//! The mean of an image, its light's cosine divided out, is smooth in both directions, so neighbours predict it. A lamp
+//! or an exposure time that differed stands out under all views, one wrong image alone. A highlight stands out too, but
 //! with all images of its geometry, and with its partner under exchanged light and view (reciprocity).
 
 use std::collections::HashSet;
@@ -87,9 +87,9 @@ fn dense(near: &Neighbourhood, directions: usize) -> bool {
     directions >= LEAST_DIRECTIONS && near.spacing_rad.to_degrees() <= SPACING_DEG
 }
 
-/// By how much each image is brighter than its neighbouring lights promise and than its neighbouring views do, as far as
-/// images of like geometry are not as well: the smaller of both, natural logarithm, 0 where they contradict each other.
-/// With sparse views the lights alone tell; nothing where those are sparse too.
+/// By how much each image is brighter than its neighbouring lights promise and than its neighbouring views do, as far
+/// as images of like geometry are not as well: the smaller of both, natural logarithm, 0 where they contradict each
+/// other. With sparse views the lights alone tell; nothing where those are sparse too.
 pub(super) fn jumps(statistics: &Statistics) -> Option<Vec<f64>> {
     let (near_lights, near_views) =
         (Neighbourhood::new(&statistics.lights), Neighbourhood::new(&statistics.views));

@@ -116,7 +116,8 @@ impl Statistics {
     }
 }
 
-/// Mean of each image, the light's cosine divided out, over the median of its view or of its light, whichever is larger.
+/// Mean of each image, the light's cosine divided out, over the median of its view or of its light, whichever is
+/// larger.
 fn relative(images: &[Image], lights: &[Direction]) -> Vec<f64> {
     let n = lights.len().max(1);
     let cosine = |light: usize| lights[light].theta_rad.cos().max(0.05);

@@ -1,5 +1,5 @@
-//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from the
-//! whole measurement or from the first mini-batch.
+//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from
+//! the whole measurement or from the first mini-batch.
 
 use std::time::Instant;
 

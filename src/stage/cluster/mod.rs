@@ -1,8 +1,8 @@
 //! Tile to clusters: index, centres, representatives and their distances.
 //!
-//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go
-//! passes over growing mini-batches ([`batches`]) and all texels ([`pass`]) that read each chunk once. What memory allows never changes a result: it only says how many bounds
-//! and blocks are kept.
+//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go passes over growing
+//! mini-batches ([`batches`]) and all texels ([`pass`]) that read each chunk once. What memory allows never changes a
+//! result: it only says how many bounds and blocks are kept.
 
 mod approach;
 mod batches;
@@ -23,7 +23,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::names::with_ending;
-use crate::run::Context;
+use crate::run::{Context, recipe};
 use crate::stage::import::Shard;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
@@ -221,10 +221,9 @@ pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurem
 /// # Errors
 /// Says which measurement differs, and what to run.
 pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Result<()> {
-    const SHOWN: usize = 12;
     let (expected, found) = (measurement_of(model)?, measurement.digest());
     let Some(expected) = expected.filter(|expected| expected != found) else { return Ok(()) };
-    let [expected, found] = [expected.as_str(), found].map(|digest| digest.get(..SHOWN).unwrap_or(digest));
+    let [expected, found] = [expected.as_str(), found].map(recipe::shortened);
     let (model, measurement) = (model.path().display(), measurement.path().display());
     Err(Error::recipe(format!(
         "{measurement} is not what {model} was made of: it was imported anew since in another way, or is another \

@@ -116,14 +116,15 @@ pub fn run(
     let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
-        stream::write(output, encoding, size, scene.meaning(), context.existing, |pixels| {
+        stream::prepare(output, encoding, size, scene.meaning(), context.existing, |pixels| {
             rows.next(pixels)?;
             if encoding.ending != Ending::Exr {
                 scene.beyond().count_pixels(scene.meaning(), pixels);
             }
             context.progress.advance(1);
             Ok(())
-        })
+        })?
+        .publish()
     })?;
     context.progress.end();
     Ok(Report { size, made, notes: scene.beyond().notes() })

@@ -241,8 +241,8 @@ impl Scene {
         Ok(Band { width, pixels })
     }
 
-    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where memory does not hold more
-    /// beside so many bytes, and how many of them fit at a time. `what` has these rows.
+    /// The bands of whole rows of chunks that the picture is read in, or of parts of them where memory does not hold
+    /// more beside so many bytes, and how many of them fit at a time. `what` has these rows.
     ///
     /// # Errors
     /// Where not even a row fits.

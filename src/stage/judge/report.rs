@@ -41,8 +41,8 @@ pub struct Report {
     pub normals: Normals,
     /// Over the whole of the subject.
     pub verdict: Verdict,
-    /// Largest correlation, in any pair, of the rows' means with those one side of the exemplar away, and of the columns'
-    /// means; absent where the subject has less than two sides.
+    /// Largest correlation, in any pair, of the rows' means with those one side of the exemplar away, and of the
+    /// columns' means; absent where the subject has less than two sides.
     pub bands: [Option<f64>; 2],
     /// The same of bands that wave, under the first pair, in a window in the middle.
     pub wavy_bands: [Option<f64>; 2],

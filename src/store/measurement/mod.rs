@@ -155,8 +155,8 @@ impl Measurement {
         Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: None })
     }
 
-    /// Declares the measurement finished, if all views are there: its root then holds checksums, and the metadata of all
-    /// arrays for other programs.
+    /// Declares the measurement finished, if all views are there: its root then holds checksums, and the metadata of
+    /// all arrays for other programs.
     ///
     /// # Errors
     /// Those of reading and writing, and where a shard's index is damaged.
@@ -182,8 +182,8 @@ impl Measurement {
         Ok(self.store.expect(KIND)?.contains_key(CHECKSUMS))
     }
 
-    /// The array whose shards of a view are not those that were written, though each may be intact; `None` where all are,
-    /// or no checksums are kept.
+    /// The array whose shards of a view are not those that were written, though each may be intact; `None` where all
+    /// are, or no checksums are kept.
     ///
     /// # Errors
     /// Where a shard is missing, or its index is damaged.
@@ -312,7 +312,7 @@ impl Measurement {
         arrays.iter().any(|&array| {
             let depth = if array == SampleArray::Reflectance { 4 } else { 3 };
             let first = self.shard_path(array, view, origin);
-            first.ancestors().nth(depth).is_some_and(|folder| holds_no_file(folder, depth))
+            first.ancestors().nth(depth).is_some_and(|folder| holds_what_is_no_file(folder, depth))
         })
     }
 
@@ -326,12 +326,12 @@ impl Measurement {
 
 /// Whether anything but a file lies `depth` folders below a folder. Only what is there is looked at: a store may claim
 /// more shards than can be counted.
-fn holds_no_file(folder: &Path, depth: usize) -> bool {
+fn holds_what_is_no_file(folder: &Path, depth: usize) -> bool {
     std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| {
         let path = entry.path();
         match depth {
             0 | 1 => !mapped::is_temporary(&path) && !path.is_file(),
-            _ => path.is_dir() && holds_no_file(&path, depth - 1),
+            _ => path.is_dir() && holds_what_is_no_file(&path, depth - 1),
         }
     })
 }

@@ -29,6 +29,8 @@ pub(super) struct Pictures {
     orientation: u8,
     /// What the first picture says of its colours; nothing of it is applied.
     profile: Option<String>,
+    /// What of the first picture is read and what is not.
+    remarks: Vec<String>,
     decoding: DecodeOptions,
     limits: Limits,
 }
@@ -65,9 +67,7 @@ impl Pictures {
                 header.orientation
             ));
         }
-        if let Some(layer) = &header.layer {
-            assumptions.push(format!("the layer {layer:?}, the only one, is the picture"));
-        }
+        assumptions.extend(header.remarks.iter().cloned());
         let contents = Contents {
             format,
             width: header.width,
@@ -83,8 +83,8 @@ impl Pictures {
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
         let notes = notes_of(&files, &images, catalogue.ignored() + files.hidden());
-        let PictureHeader { orientation, profile, .. } = header;
-        Ok(Self { path, files, images, notes, contents, orientation, profile, decoding, limits })
+        let PictureHeader { orientation, profile, remarks, .. } = header;
+        Ok(Self { path, files, images, notes, contents, orientation, profile, remarks, decoding, limits })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -116,6 +116,18 @@ impl Pictures {
                 self.files.name(file),
                 told(&found.profile),
                 told(&self.profile)
+            )));
+        }
+        if found.remarks != self.remarks {
+            let told = |remarks: &[String]| match remarks {
+                [] => "the whole file is the picture".to_owned(),
+                list => list.join("; "),
+            };
+            return Err(Error::input(format!(
+                "{}: got {}, expected, like the first image, {}",
+                self.files.name(file),
+                told(&found.remarks),
+                told(&self.remarks)
             )));
         }
         Ok(checksum)

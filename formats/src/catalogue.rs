@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::Angles;
+use crate::{Angles, six_digits};
 
 /// Missing pairs that are listed one by one; more are only counted, since a few names can lack millions.
 const MAX_LISTED: usize = 1 << 16;
@@ -40,11 +40,10 @@ pub struct Pair {
 }
 
 impl fmt::Display for Pair {
-    /// As in file names, in degrees without leading zeros, to four decimals.
+    /// As in file names, in degrees without leading zeros, to six digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shown = |degrees: f64| (degrees * 1e4).round() / 1e4;
-        let (tl, pl) = (shown(self.light.theta_deg()), shown(self.light.phi_deg()));
-        let (tv, pv) = (shown(self.view.theta_deg()), shown(self.view.phi_deg()));
+        let (tl, pl) = (six_digits(self.light.theta_deg()), six_digits(self.light.phi_deg()));
+        let (tv, pv) = (six_digits(self.view.theta_deg()), six_digits(self.view.phi_deg()));
         write!(f, "tl{tl} pl{pl} tv{tv} pv{pv}")
     }
 }

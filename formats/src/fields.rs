@@ -122,8 +122,10 @@ impl Forms {
         let angles = |side, form| {
             let get = |component| value(Field { side, component }).unwrap_or(f64::NAN);
             match form {
-                Form::Polar => Angles::new(get(Component::Theta), get(Component::Phi))
-                    .ok_or((Field { side, component: Component::Theta }, "theta in 0..=90 degrees")),
+                Form::Polar => Angles::new(get(Component::Theta), get(Component::Phi)).ok_or((
+                    Field { side, component: Component::Theta },
+                    "theta in 0..=90 degrees and phi within ten turns",
+                )),
                 Form::Vector => Angles::from_vector(VECTOR.map(get))
                     .map_err(|expected| (Field { side, component: Component::Z }, expected)),
             }

@@ -165,6 +165,10 @@ impl Source for Adapted {
         if self.swap { 1 } else { self.inner.lights_at_once() }
     }
 
+    fn bytes_beside_image(&self) -> u64 {
+        self.inner.bytes_beside_image()
+    }
+
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
         Ok(self.converted(&self.mended(view, lights.clone())?, lights.start))
     }

@@ -192,7 +192,7 @@ fn a_picture_that_is_alone_is_named() {
     assert_ne!(wrong, names[20]);
     names[20].clone_from(&wrong);
     let errors = *catalogue(&names).unwrap_err();
-    assert_eq!(errors.lone, [wrong.clone()]);
+    assert_eq!(errors.lone, std::slice::from_ref(&wrong));
     let words = format!("the only picture of its light or view, so perhaps misnamed: 1\n  {wrong:?}");
     assert!(errors.to_string().contains(&words), "{errors}");
     // Where every light and view has one picture only, none is.

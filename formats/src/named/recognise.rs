@@ -104,6 +104,9 @@ impl Labels {
         let stem = picture_stem(name)?;
         let file = self.fields_of(base(stem))?;
         let parse = |text: &str| Pattern::parse(text).ok().filter(|pattern| pattern.angles(name).is_some());
+        if !units_agree(&file) {
+            return None;
+        }
         let alone = parse(&file);
         if alone.as_ref().is_some_and(Pattern::has_view) {
             return alone;
@@ -115,6 +118,9 @@ impl Labels {
             return None;
         }
         let below = format!("{}/{file}", folder.as_deref().unwrap_or("{*}"));
+        if !units_agree(&below) {
+            return None;
+        }
         if let Some(both) = folder.and_then(|_| parse(&below)).filter(Pattern::has_view) {
             return Some(both);
         }
@@ -140,6 +146,9 @@ impl Labels {
             }
             let fields = fields.filter(|_| plain);
             below = format!("{}/{below}", fields.as_deref().unwrap_or("{*}"));
+            if !units_agree(&below) {
+                return None;
+            }
             if let Some(found) = parse(&below).filter(|found| plain && found.has_view()) {
                 return Some(found);
             }
@@ -261,6 +270,13 @@ fn braced(field: Field, unit: Unit) -> String {
     format!("{{{}{unit}}}", field.name())
 }
 
+/// Whether all angles of a pattern are in one unit: a single `rad` may be meant for all of them.
+fn units_agree(pattern: &str) -> bool {
+    let radians = pattern.matches(":rad}").count();
+    let angles = ["{theta_", "{phi_"].map(|start| pattern.matches(start).count());
+    radians == 0 || radians == angles.iter().sum::<usize>()
+}
+
 /// Folders above the picture's own that are looked at for labels.
 const MOST_FOLDERS: usize = 8;
 
@@ -358,6 +374,11 @@ mod tests {
                 "TL{theta_i:rad}RAD PL{phi_i:rad}rad_TV{theta_v:rad}rad-pv{phi_v:rad} rad",
             ),
             ("l0.26_1.57rad_v0_0rad.png", "l{theta_i:rad}_{phi_i:rad}rad_v{theta_v:rad}_{phi_v:rad}rad"),
+            ("tl0.26_pl1.57_rad.png", ""),
+            ("tl0.26rad_pl1.57rad_tv0_pv0.png", ""),
+            ("tv0_pv0/tl0.26rad_pl1.57rad.png", ""),
+            ("view_0_0/a/tl0.26rad_pl1.57rad.png", ""),
+            ("tv0_pv0/a/tl0.26rad_pl1.57rad.png", ""),
             ("tl15deg_pl30\u{b0}.png", "tl{theta_i}deg_pl{phi_i}\u{b0}"),
             ("tl0.26radpl1.57rad.png", ""),
             ("tl15grad_pl30grad.png", ""),

@@ -67,7 +67,7 @@ fn radians_are_read_where_they_are_said_and_doubted_by_every_command_where_not()
         assert!(said.contains("if the angles are radians"), "{arguments:?}: {said}");
     }
     let json: serde_json::Value = serde_json::from_str(&output(&["check", "--json"])).unwrap();
-    assert!(json["notes"][0].as_str().unwrap().contains("radians"));
+    assert!(json["notes"].to_string().contains("if the angles are radians"));
 }
 
 #[test]

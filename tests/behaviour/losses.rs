@@ -97,3 +97,32 @@ fn wavelengths_and_components_that_are_left_out_are_named() {
     let told = succeed(btf().arg("export").arg(fixture().measurement()).arg(folder.path().join("e8.zip")));
     assert!(!told.contains("note"), "{told}");
 }
+
+/// Of samples that are no numbers the ratio of signal and noise is taken without them, and says so; of nothing else
+/// there is none.
+#[test]
+fn a_comparison_leaves_out_what_is_no_number_and_counts_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let compare = |store: &Path, clusters: &str| -> serde_json::Value {
+        let model = store.with_extension(format!("{clusters}.model.zarr"));
+        let mut tile = btf();
+        succeed(tile.arg("tile").args([store, &model]).args(["--tile", "none"]));
+        succeed(btf().arg("cluster").args([store, &model]).args(["--clusters", clusters]));
+        let told = succeed(btf().arg("compare").args([&model, store]).arg("--json"));
+        serde_json::from_str::<serde_json::Value>(&told).unwrap()["all"].clone()
+    };
+    // One texel of 64 under 3 lights holds none, of 3 channels.
+    let some = folder.path().join("some");
+    let store = measurement(&some, &["R", "G", "B"], true);
+    let all = compare(&store, "4");
+    assert_eq!(all["samples_left_out"], 9, "{all}");
+    assert_eq!(all["samples"], "different", "{all}");
+    assert!(all["psnr_db"].as_f64().is_some_and(f64::is_finite), "{all}");
+    let told = succeed(btf().arg("compare").arg(store.with_extension("4.model.zarr")).arg(&store));
+    assert!(told.contains("9 samples"), "{told}");
+    // A cluster for every texel: equal.
+    let none = folder.path().join("none");
+    let all = compare(&measurement(&none, &["R", "G", "B"], false), "64");
+    assert_eq!((&all["samples_left_out"], &all["samples"]), (&0.into(), &"equal".into()), "{all}");
+    assert!(all["psnr_db"].is_null(), "{all}");
+}

@@ -69,11 +69,19 @@ impl Check {
     fn report(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<(Statistics, Report)> {
         let path = first(paths);
         if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
-            return check::run(&open(path)?, context);
+            let measurement = open(path)?;
+            let (statistics, mut report) = check::run(&measurement, context)?;
+            // One that was made by an older version, or crafted, may not say how it was read.
+            let attributes = measurement.attributes()?;
+            let reading = attributes.get("recipe").and_then(|recipe| recipe.get("reading")).cloned();
+            report.beside(&serde_json::from_value(reading.unwrap_or_default()).unwrap_or_default());
+            return Ok((statistics, report));
         }
         let source = self.source.open(paths)?;
         let description = import::describe(source.as_ref(), 1.0);
-        check::run(&ArchiveViews::new(source.as_ref(), description), context)
+        let (statistics, mut report) = check::run(&ArchiveViews::new(source.as_ref(), description), context)?;
+        report.beside(&source.reading().adaptation);
+        Ok((statistics, report))
     }
 
     fn one_of_many(&self, path: &PathBuf, context: &Context<'_>) -> Result<Outcome> {

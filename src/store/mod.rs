@@ -333,6 +333,7 @@ impl Store {
                 None => {
                     let expected = recognise::one_of(kinds);
                     Error::missing(format!("{}: no store here, expected {expected}", self.path.display()))
+                        .hint(recognise::how_made(kinds))
                 }
             });
         };

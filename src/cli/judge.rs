@@ -97,8 +97,14 @@ fn told(report: &Report) -> String {
             report.crop
         ),
         format!("by {}: {origin}", counted(report.real_crops.len(), "real crop")),
-        String::new(),
     ];
+    if let Some([height, width]) = report.in_phase_within {
+        let cell = Size::new(height, width);
+        lines.push(format!(
+            "a regular material: crops moved by up to {cell} so that they are in phase with real ones"
+        ));
+    }
+    lines.push(String::new());
     let mut head = vec![String::new()];
     head.extend(Measure::ALL.map(|measure| measure.name().to_owned()));
     head.extend(row!["J", "worst", "excess peak"]);

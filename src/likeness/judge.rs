@@ -68,11 +68,24 @@ impl Judge {
         self.floor
     }
 
-    /// Judges pictures of the size of the real crops, all together.
+    /// Judges pictures of the size of the real crops, all together, each against every real crop.
     ///
     /// # Errors
     /// No picture, or one of another size than the real crops.
     pub fn judge(&self, pictures: &[Lightness]) -> Result<Judgement> {
+        self.judge_by(pictures, |_, _| true)
+    }
+
+    /// Judges pictures of which number n was chosen to look like real crop n, modulo their number: each against the other
+    /// real crops only.
+    ///
+    /// # Errors
+    /// Those of [`Judge::judge`].
+    pub fn judge_partners(&self, pictures: &[Lightness]) -> Result<Judgement> {
+        self.judge_by(pictures, |picture, real| picture % self.reals.len() != real)
+    }
+
+    fn judge_by(&self, pictures: &[Lightness], counts: impl Fn(usize, usize) -> bool) -> Result<Judgement> {
         if pictures.is_empty() || pictures.iter().any(|picture| picture.size != self.size) {
             let sizes: Vec<String> = pictures.iter().map(|picture| picture.size.to_string()).collect();
             return Err(Error::usage(format!(
@@ -82,8 +95,12 @@ impl Judge {
         }
         let found: Vec<Statistics> =
             pictures.par_iter().map(|picture| Statistics::of(picture, &self.edges)).collect();
-        let pairs: Vec<_> = found.iter().flat_map(|a| self.reals.iter().map(move |b| (a, b))).collect();
-        let distances: Vec<_> = pairs.par_iter().map(|(a, b)| a.distances(b)).collect();
+        let pairs: Vec<_> = (0..found.len())
+            .flat_map(|picture| (0..self.reals.len()).map(move |real| (picture, real)))
+            .filter(|&(picture, real)| counts(picture, real))
+            .collect();
+        let distances: Vec<_> =
+            pairs.par_iter().map(|&(picture, real)| found[picture].distances(&self.reals[real])).collect();
         let distances = means(&distances);
         let measures = std::array::from_fn(|n| distances[n] / self.floor[n]);
         let worst = largest(&measures);

@@ -238,3 +238,63 @@ fn a_measurement_that_is_too_small_is_named() {
     assert!(told.contains("48x56") || told.contains("56x48"), "{told}");
     assert!(told.contains("128x128"), "{told}");
 }
+
+/// A floor of square stones, 48 texels apart, of different greys: 192x192 texels, under four lights.
+fn floor_of_stones(at: &Path) {
+    const SIDE: usize = 192;
+    const PERIOD: usize = 48;
+    let hash = Hash::new(1, 0);
+    let grey = |y: usize, x: usize, light: usize| {
+        let noise = hash.uniforms(y as u32, x as u32, 0)[0];
+        let stone = hash.uniforms((y / PERIOD) as u32, (x / PERIOD) as u32, 1)[0];
+        let (in_y, in_x) = (y % PERIOD, x % PERIOD);
+        let depth = if in_y.min(in_x) < 5 { 60.0 } else { 0.0 };
+        let edge = if [in_y, in_x, PERIOD - 1 - in_y, PERIOD - 1 - in_x][light] == 5 { 40.0 } else { 0.0 };
+        (130.0 + 30.0 * stone + 20.0 * noise + edge - depth) as u8
+    };
+    let light = |n: usize| (0..SIDE * SIDE).flat_map(move |at| [grey(at / SIDE, at % SIDE, n); 3]);
+    let values: Vec<u8> = (0..4).flat_map(light).collect();
+    let header = btfkit_formats::npy::header([1, 4, 192, 192, 3], btfkit_formats::SampleType::U8);
+    std::fs::write(at.with_extension("npy"), [header, values].concat()).unwrap();
+    let directions = |angles: &[[f64; 2]]| {
+        let directions: Vec<_> =
+            angles.iter().map(|&[theta, phi]| btfkit_formats::Direction::from_degrees(theta, phi)).collect();
+        btfkit_formats::npy::directions_file(&directions)
+    };
+    std::fs::write(at.with_extension("views.npy"), directions(&[[0.0, 0.0]])).unwrap();
+    let lights = [[45.0, 0.0], [45.0, 90.0], [45.0, 180.0], [45.0, 270.0]];
+    std::fs::write(at.with_extension("lights.npy"), directions(&lights)).unwrap();
+}
+
+#[test]
+fn where_an_enlargement_of_a_regular_material_begins_does_not_matter() {
+    let folder = tempfile::tempdir().unwrap();
+    let [archive, store, model, report] =
+        ["a.npy", "a.zarr", "a.model.zarr", "a.json"].map(|name| folder.path().join(name));
+    floor_of_stones(&archive);
+    succeed(btf().arg("import").args([&archive, &store]));
+    succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
+    succeed(btf().arg("cluster").args([&store, &model]).args(["--clusters", "64"]));
+    succeed(btf().arg("appearance").arg(&model));
+    // The four quadrants that it is judged by lie two periods apart, the middle and the last crops anywhere.
+    let mut found = Vec::new();
+    for size in ["288x288", "305x331"] {
+        let mut command = btf();
+        command
+            .arg("judge")
+            .arg(&model)
+            .arg("--against")
+            .arg(&store)
+            .args(["--size", size, "--force"])
+            .args(["--pair", "0,0", "--pair", "0,1"]);
+        succeed(command.arg("--json").arg(&report));
+        let report = json(&report);
+        assert_eq!(report["in_phase_within"], serde_json::json!([48, 48]), "{size}");
+        found.push(["own", "alone"].map(|row| report["mean"][row]["j"].as_f64().unwrap()));
+        println!("{size}: {:?}", found.last());
+    }
+    for [own, alone] in &found {
+        assert!((own - found[0][0]).abs() < 0.05 && (alone - found[0][1]).abs() < 0.2, "{found:?}");
+        assert!(*own < 1.3 && *alone < 2.3, "{found:?}");
+    }
+}

@@ -14,6 +14,9 @@ const PROGRAM_BYTES: usize = 64 << 20;
 /// Most bytes of the sample's vectors, unless told otherwise. Fixed, so that a result does not depend on memory.
 const SAMPLE_BYTES: usize = 192 << 20;
 
+/// The part of memory that is left to the allocator and the system, so that the promise holds with room to spare.
+const SPARE_PART: usize = 16;
+
 /// Blocks' worth of memory that the allocator cannot give back for lying between blocks that are kept.
 const SCATTERED_BLOCKS: usize = 3;
 
@@ -72,6 +75,7 @@ impl Budget {
     pub(super) fn of(plan: &Plan, clusters: usize, context: &Context<'_>) -> Result<Self> {
         let needed = Self::least(plan, clusters, context.threads);
         let memory = usize::try_from(context.memory_bytes).unwrap_or(usize::MAX);
+        let memory = (memory - memory / SPARE_PART).max(needed);
         let what = format!(
             "clustering {} into {}",
             counted(plan.selection.texels(), "texel"),

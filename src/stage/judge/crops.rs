@@ -135,6 +135,12 @@ pub(super) fn crops_of(size: Size, side: usize) -> Vec<Window> {
     places(size.height).into_iter().flat_map(|y| columns.iter().map(move |&x| window(y, x))).collect()
 }
 
+/// Rows and columns spread over an exemplar, three down and three across, at which crops of its repetition begin.
+pub(super) fn spread_over(exemplar: Size) -> Vec<[usize; 2]> {
+    let places = |length: usize| (0..3).map(move |n| n * length / 3);
+    places(exemplar.height).flat_map(|y| places(exemplar.width).map(move |x| [y, x])).collect()
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

@@ -5,6 +5,7 @@
 mod crops;
 mod normals;
 mod pairs;
+mod phase;
 mod report;
 mod sheet;
 mod subject;
@@ -71,6 +72,23 @@ struct Crops {
     side: usize,
     reals: Vec<Window>,
     enlarged: Vec<Window>,
+    /// Rows and columns of crops of the plane that repeats the exemplar.
+    repeated: Vec<[usize; 2]>,
+    /// Rows and columns within which crops of a regular material were moved into phase with real ones.
+    cell: Option<Size>,
+}
+
+impl Crops {
+    /// Judges crops that were cut here.
+    fn judge(&self, judge: &Judge, pictures: &[Lightness]) -> Result<Judgement> {
+        if self.cell.is_some() { judge.judge_partners(pictures) } else { judge.judge(pictures) }
+    }
+
+    /// The crops of the plane that repeats an exemplar.
+    fn of_repeated(&self, exemplar: &Lightness) -> Vec<Lightness> {
+        let size = Size::new(self.side, self.side);
+        self.repeated.iter().map(|&[y, x]| exemplar.repeated(y, x, size)).collect()
+    }
 }
 
 /// What was found under one pair.
@@ -104,15 +122,18 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)
             measurement.path().display()
         )));
     }
-    let (exemplar, wraps, lattice) = exemplar_of(&model, &tile)?;
+    let (exemplar, wraps, counts) = exemplar_of(&model, &tile)?;
+    let lattice = model.tile_report()?.lattice;
     let clusters = centres.len() / brdf;
     let material = Material { tile: tile.size, index: &index, exemplar, wraps, clusters };
     let Size { height, width } = subject.size();
     let reals = crops::real_crops(description.size, tile.bounds(), height.min(width), options.crop)?;
-    let crops = Crops {
+    let mut crops = Crops {
         side: reals.side,
         reals: reals.windows,
         enlarged: crops::crops_of(subject.size(), reals.side),
+        repeated: crops::spread_over(exemplar.size),
+        cell: phase::cell(&lattice, reals.side),
     };
     let mut codes = Vec::with_capacity(pairs.len());
     context.progress.begin("read", pairs.len() as u64, Counted::Items("pairs"));
@@ -127,13 +148,16 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)
     }
     context.progress.end();
     let (verdict, bands) = whole::look(&subject, &material, &codes, context)?;
-    let periods = lattice.lattice(exemplar.size).vectors();
+    if let (Some(cell), Some(&pair), Some(codes)) = (crops.cell, pairs.first(), codes.first()) {
+        let real = real_crops(&measurement, pair, &crops)?;
+        context.compute(|| move_into_phase(&mut crops, cell, &subject, &material, codes, &real))?;
+    }
+    let periods = counts.lattice(exemplar.size).vectors();
     let mut found = Vec::with_capacity(pairs.len());
     context.progress.begin("judge", pairs.len() as u64, Counted::Items("pairs"));
     for (&pair, codes) in pairs.iter().zip(&codes) {
         context.check_stop()?;
-        let real: Vec<Lightness> =
-            crops.reals.iter().map(|&window| real_crop(&measurement, pair, window)).collect::<Result<_>>()?;
+        let real = real_crops(&measurement, pair, &crops)?;
         found.push(context.compute(|| judge_pair(&subject, &material, &crops, codes, &real, &periods))?);
         context.progress.advance(1);
     }
@@ -154,6 +178,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<(Report, Picture)
         crop: crops.side,
         real_crops: crops.reals.iter().map(corner).collect(),
         crops: crops.enlarged.iter().map(corner).collect(),
+        in_phase_within: crops.cell.map(|cell| [cell.height, cell.width]),
         pairs: pairs.iter().zip(&found).map(|(&pair, found)| told(&measurement, pair, found)).collect(),
         mean: mean(&found)?,
         normals,
@@ -221,16 +246,35 @@ fn codes_of(
     Ok(measurement.read_luminance(view, window)?.into_iter().skip(light).step_by(lights))
 }
 
-fn real_crop(measurement: &Measurement, pair: [usize; 2], window: Window) -> Result<Lightness> {
-    Ok(Lightness::of_codes(window.size, codes_of(measurement, pair, window)?))
+fn real_crops(measurement: &Measurement, pair: [usize; 2], crops: &Crops) -> Result<Vec<Lightness>> {
+    let crop = |&window: &Window| Ok(Lightness::of_codes(window.size, codes_of(measurement, pair, window)?));
+    crops.reals.iter().map(crop).collect()
 }
 
-/// Crops of the plane that repeats an exemplar, at places spread over it.
-fn repeated_crops(exemplar: &Lightness, side: usize) -> Vec<Lightness> {
-    let places = |length: usize| (0..3).map(move |n| n * length / 3);
-    let size = Size::new(side, side);
-    let row = |y: usize| places(exemplar.size.width).map(move |x| exemplar.repeated(y, x, size));
-    places(exemplar.size.height).flat_map(row).collect()
+/// Moves crops of the enlargement and of the repeated exemplar, within a cell, into phase with the real crops.
+fn move_into_phase(
+    crops: &mut Crops,
+    cell: Size,
+    subject: &Subject,
+    material: &Material<'_>,
+    codes: &Codes,
+    real: &[Lightness],
+) -> Result<()> {
+    let side = Size::new(crops.side, crops.side);
+    for (crop, partner) in crops.enlarged.iter_mut().zip(real.iter().cycle()) {
+        let around = phase::around(*crop, cell, subject.size());
+        let (alone, with_model) = pictures_of(subject, material, codes, around)?;
+        let [y, x] = phase::best_place(alone.as_ref().unwrap_or(&with_model), partner);
+        *crop = Window { y: around.y + y, x: around.x + x, size: side };
+    }
+    let tile = Lightness::of_codes(material.tile, codes.tile.iter().copied());
+    let exemplar = tile.part(material.exemplar);
+    let size = Size::new(side.height + cell.height - 1, side.width + cell.width - 1);
+    for (place, partner) in crops.repeated.iter_mut().zip(real.iter().cycle()) {
+        let [y, x] = phase::best_place(&exemplar.repeated(place[0], place[1], size), partner);
+        *place = [place[0] + y, place[1] + x];
+    }
+    Ok(())
 }
 
 fn judge_pair(
@@ -243,32 +287,45 @@ fn judge_pair(
 ) -> Result<Found> {
     let judge = Judge::new(real)?;
     let tile = Lightness::of_codes(material.tile, codes.tile.iter().copied());
-    let repeated = repeated_crops(&tile.part(material.exemplar), crops.side);
+    let repeated = crops.of_repeated(&tile.part(material.exemplar));
     let (mut alone, mut with_model) = (Vec::new(), Vec::new());
     for &window in &crops.enlarged {
-        let texels = subject.texels(window, material.clusters, material.tile)?;
-        let of_cluster = |&cluster: &u16| codes.clusters[usize::from(cluster)];
-        with_model.push(Lightness::of_codes(window.size, texels.index.iter().map(of_cluster)));
-        if let Some(source) = texels.source {
-            let of_texel = |&texel: &u32| codes.tile[texel as usize];
-            alone.push(Lightness::of_codes(window.size, source.iter().map(of_texel)));
-        }
+        let (of_texels, of_clusters) = pictures_of(subject, material, codes, window)?;
+        alone.extend(of_texels);
+        with_model.push(of_clusters);
     }
     let seen = if alone.is_empty() { &with_model } else { &alone };
     let lattice = lattice_of(seen, &repeated, periods);
     let middle = crops.enlarged.len() / 2;
     Ok(Found {
-        own: judge.judge(&repeated)?,
-        alone: if alone.is_empty() { None } else { Some(judge.judge(&alone)?) },
-        with_model: judge.judge(&with_model)?,
+        own: crops.judge(&judge, &repeated)?,
+        alone: if alone.is_empty() { None } else { Some(crops.judge(&judge, &alone)?) },
+        with_model: crops.judge(&judge, &with_model)?,
         floor: judge.floor(),
         lattice,
         panels: Panels {
-            real: real[0].clone(),
+            // The real crop with which the middle one is in phase.
+            real: real[middle % real.len()].clone(),
             alone: alone.get(middle).cloned(),
             with_model: with_model[middle].clone(),
         },
     })
+}
+
+/// A window with the values measured where its texels come from, as far as that is known, and with the clusters' values.
+fn pictures_of(
+    subject: &Subject,
+    material: &Material<'_>,
+    codes: &Codes,
+    window: Window,
+) -> Result<(Option<Lightness>, Lightness)> {
+    let texels = subject.texels(window, material.clusters, material.tile)?;
+    let of_cluster = |&cluster: &u16| codes.clusters[usize::from(cluster)];
+    let of_texel = |texel: u32| codes.tile[texel as usize];
+    let with_model = Lightness::of_codes(window.size, texels.index.iter().map(of_cluster));
+    let source = texels.source;
+    let alone = source.map(|source| Lightness::of_codes(window.size, source.into_iter().map(of_texel)));
+    Ok((alone, with_model))
 }
 
 /// Mean autocorrelation at the periods of a lattice that half a crop holds: of an enlargement and of its exemplar.

@@ -2,10 +2,10 @@
 
 use serde_json::{Map, Value};
 
+use super::Crops;
 use super::report::{NormalRows, Normals};
 use super::subject::Subject;
 use super::whole::Material;
-use super::{Crops, repeated_crops};
 use crate::error::Result;
 use crate::likeness::{Judge, Lightness};
 use crate::run::Context;
@@ -67,8 +67,8 @@ pub(super) fn judge(
         let judge = Judge::new(&component_of(&measured, axis))?;
         let exemplar = component(&tile, material.tile, axis).part(material.exemplar);
         Ok(NormalRows {
-            own: (&judge.judge(&repeated_crops(&exemplar, crops.side))?).into(),
-            enlarged: (&judge.judge(&component_of(&enlarged, axis))?).into(),
+            own: (&crops.judge(&judge, &crops.of_repeated(&exemplar))?).into(),
+            enlarged: (&crops.judge(&judge, &component_of(&enlarged, axis))?).into(),
         })
     };
     // A surface without relief has normals without contrast.

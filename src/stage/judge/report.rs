@@ -33,6 +33,9 @@ pub struct Report {
     pub real_crops: Vec<[usize; 2]>,
     /// Row and column of each crop of the subject.
     pub crops: Vec<[usize; 2]>,
+    /// Rows and columns, a cell of the lattice, within which crops of a regular material were moved so that each is in
+    /// phase with one real crop, its partner: crop n with real crop n modulo their number.
+    pub in_phase_within: Option<[usize; 2]>,
     /// Under each pair of directions.
     pub pairs: Vec<Pair>,
     /// Means over the pairs.

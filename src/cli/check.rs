@@ -99,7 +99,7 @@ fn faults(path: &Path, report: &Report) -> Option<Error> {
     let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
     let error =
         (!faults.is_empty()).then(|| Error::input(format!("{}: {}", path.display(), faults.join(", "))))?;
-    Some(error.hint("docs/how-to/check.md tells how each is recognised and what to do"))
+    Some(error.hint("docs/how-to/check.md says what each means and what to do about it"))
 }
 
 /// A measurement that is complete.

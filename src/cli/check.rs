@@ -24,7 +24,7 @@ Examples:
   btf check UBO_WOOD256.zip --picture wood.png
   btf check felt.btf --azimuth mirrored             does that repair it?
   btf check archives/*                              a line each, and a count
-Exits with 65 if there is a fault. docs/check.md explains every check.")]
+Exits with 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
     /// Measurements and archives; of several each has a line
     #[arg(required = true, value_name = "PATH")]
@@ -127,7 +127,7 @@ fn faults(path: &Path, report: &Report) -> Option<Error> {
     let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
     let error =
         (!faults.is_empty()).then(|| Error::input(format!("{}: {}", path.display(), faults.join(", "))))?;
-    Some(error.hint("docs/check.md tells how each is recognised and what to do"))
+    Some(error.hint("docs/how-to/check.md says what each means and what to do about it"))
 }
 
 /// A measurement that is complete.

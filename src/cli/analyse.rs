@@ -126,7 +126,7 @@ pub(super) struct Whole {
     dry_run: bool,
 }
 
-/// Cluster the BRDFs of a model's tile
+/// Cluster the BRDFs of a model's tile, by lightness
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -141,7 +141,8 @@ Many processes, the same bytes (exit code 66: something that this step needs is 
   btf cluster wood.zarr plane.model.zarr --step prepare
   btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
   btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
-When nothing is gained any more, reduce writes the model, and further steps have nothing to do.")]
+When nothing is gained any more, reduce writes the model, and further steps have nothing to do.
+Texels of one lightness and another hue are alike to it: btf compare tells what that does to colours.")]
 pub(super) struct Cluster {
     /// The measurement
     measurement: PathBuf,
@@ -242,6 +243,7 @@ impl Whole {
             context.progress.stage(Some(stage));
         };
         // A line may be told only while no bar is drawn.
+        let tell = tell.brief();
         let told = |found: bool, told: &dyn Fn(Tell)| context.progress.pause(&mut || told(tell.found(found)));
         begin(Stage::Tile);
         let found = plan.is_done();
@@ -387,6 +389,17 @@ fn tell_clusters(report: &cluster::Report, tell: Tell) {
             format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
         }
     };
+    let stored = report.representative_bytes + report.index_bytes;
+    let ratio = |bytes: u64| bytes as f64 / stored as f64;
+    if tell.brief {
+        let error = report.representative_lightness_error;
+        let ratio = ratio(report.measurement_bytes);
+        let text = format!(
+            "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
+            report.clusters
+        );
+        return tell.stage("clusters", &text);
+    }
     let how = taken
         .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
     tell.stage(
@@ -402,8 +415,6 @@ fn tell_clusters(report: &cluster::Report, tell: Tell) {
         report.representative_from_centre_most,
         counted(report.single_texel_clusters, "cluster")
     ));
-    let stored = report.representative_bytes + report.index_bytes;
-    let ratio = |bytes: u64| bytes as f64 / stored as f64;
     tell.line(format!(
         "size      representatives {} + index {}: 1:{:.1} of the raw tile, 1:{:.0} of the raw measurement",
         bytes_text(report.representative_bytes),
@@ -434,21 +445,29 @@ impl Compare {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
             tell.plan(&value)?;
         } else {
-            let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000"]];
+            let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
             for errors in report.elevations.iter().chain([&report.all]) {
                 rows.push(row![
                     errors.view_theta_deg.map_or("all".to_owned(), |theta| format!("{theta}")),
                     errors.views,
                     format!("{:.3}", errors.lightness),
                     errors.psnr_text(),
-                    format!("{:.3}", errors.ciede2000)
+                    format!("{:.3}", errors.ciede2000),
+                    format!("{:.2}", errors.ciede2000_95)
                 ]);
             }
             tell.text(&table(&rows));
             tell.line(format!(
-                "CIEDE2000 over {}, the other figures over all",
+                "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
+            if report.all.hues_are_lost() {
+                tell.line(format!(
+                    "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
+                     texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
+                    report.all.ciede2000, report.all.lightness
+                ));
+            }
             if report.all.samples_left_out > 0 {
                 let count = counted(report.all.samples_left_out, "sample");
                 tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));

@@ -50,17 +50,21 @@ pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
     let [_, _, height, width] = report.exemplar;
     let coarsest = report.levels.last().map_or(1, |level| level.spacing);
     let levels = counted(report.levels.len(), "level");
-    tell.stage("exemplar", &format!("{width}x{height}, described at {levels}, 1 to {coarsest} texels apart"));
     let counts = WaveCounts(report.lattice.clone());
     let cells = counts.cells();
-    tell.line(match (report.found.as_str(), report.lattice.len()) {
-        ("none", _) => "          no lattice in it".to_owned(),
-        (found, 0) => {
-            format!("          lattice {found}, not used: the exemplar is no whole number of its cells")
-        }
-        (found, 1) => format!("          ribs, a period of {found} texels (rows, columns), {cells} of them"),
-        (found, _) => format!("          lattice of {found} texels (rows, columns), {cells} cells"),
-    });
+    let lattice = match (report.found.as_str(), report.lattice.len()) {
+        ("none", _) => "no lattice in it".to_owned(),
+        (found, 0) => format!("lattice {found}, not used: the exemplar is no whole number of its cells"),
+        (found, 1) => format!("ribs, a period of {found} texels (rows, columns), {cells} of them"),
+        (found, _) => format!("lattice of {found} texels (rows, columns), {cells} cells"),
+    };
+    if tell.brief {
+        tell.stage("exemplar", &format!("{width}x{height}; {lattice}"));
+    } else {
+        let text = format!("{width}x{height}, described at {levels}, 1 to {coarsest} texels apart");
+        tell.stage("exemplar", &text);
+        tell.line(format!("          {lattice}"));
+    }
     let fewest = counts.fewest_in_a_direction();
     if !report.lattice.is_empty() && fewest < FEW_CELLS {
         tell.line(format!(

@@ -66,6 +66,12 @@ mod tests {
             ("64KB", 64_000),
             ("0.0000001TB", 100_000),
             ("1tib", 1 << 40),
+            ("1tb", 1_000_000_000_000),
+            ("1mib", 1 << 20),
+            ("1kib", 1 << 10),
+            // Digits beyond a byte are left out, however many there are.
+            ("1.50000000000000000000000000000000000001k", 1536),
+            ("16777215TiB", ((1 << 24) - 1) << 40),
         ] {
             assert_eq!(parse_bytes(text), Ok(bytes), "{text}");
         }

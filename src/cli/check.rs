@@ -24,7 +24,7 @@ Examples:
   btf check UBO_WOOD256.zip --picture wood.png
   btf check felt.btf --azimuth mirrored             does that repair it?
   btf check archives/*                              a line each, and a count
-Exits with 65 if there is a fault. docs/check.md explains every check.")]
+Exits with 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
     /// Measurements and archives; of several each has a line
     #[arg(required = true, value_name = "PATH")]
@@ -71,12 +71,18 @@ impl Check {
     fn examine(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Examined> {
         let path = first(paths);
         if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
-            let (statistics, report) = check::run(&open(path)?, context)?;
+            let measurement = open(path)?;
+            let (statistics, mut report) = check::run(&measurement, context)?;
+            // One that was made by an older version, or crafted, may not say how it was read.
+            let attributes = measurement.attributes()?;
+            let reading = attributes.get("recipe").and_then(|recipe| recipe.get("reading")).cloned();
+            report.beside(&serde_json::from_value(reading.unwrap_or_default()).unwrap_or_default());
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;
         let description = import::describe(source.as_ref(), 1.0);
-        let (statistics, report) = check::run(&ArchiveViews::new(source.as_ref(), description), context)?;
+        let (statistics, mut report) = check::run(&ArchiveViews::new(source.as_ref(), description), context)?;
+        report.beside(&source.reading().adaptation);
         Ok(Examined { statistics, report, notes: btfkit::archive::notes(source.as_ref()) })
     }
 
@@ -121,7 +127,7 @@ fn faults(path: &Path, report: &Report) -> Option<Error> {
     let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
     let error =
         (!faults.is_empty()).then(|| Error::input(format!("{}: {}", path.display(), faults.join(", "))))?;
-    Some(error.hint("docs/check.md tells how each is recognised and what to do"))
+    Some(error.hint("docs/how-to/check.md says what each means and what to do about it"))
 }
 
 /// A measurement that is complete.

@@ -9,6 +9,7 @@ use btfkit::stage::fit::statistics::{COMPONENTS, Figures};
 use btfkit::stage::fit::{self, sheet};
 use btfkit::store::field::FieldReport;
 use btfkit::store::output::{prepare_bytes, publish_all};
+use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::Tell;
@@ -137,8 +138,14 @@ pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
             format!("{width}x{height} eta {} radius {:.3} gain {:.2}", level.eta, level.radius, level.gain)
         })
         .collect();
-    tell.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
-    tell.line(format!("          error of its autocovariance {:.3}", report.autocovariance_error));
+    let error = format!("error of its autocovariance {:.3}", report.autocovariance_error);
+    if tell.brief {
+        let levels = counted(report.levels.len(), "level");
+        tell.stage("field", &format!("{}, {levels}; {error}", report.mrf));
+    } else {
+        tell.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
+        tell.line(format!("          {error}"));
+    }
     for (number, level) in report.levels.iter().enumerate() {
         if let Some(note) = &level.note {
             tell.line(format!("          level {number}: {note}"));

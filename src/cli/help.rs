@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::store::mapped::write_file;
+use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Command, CommandFactory};
@@ -53,6 +54,18 @@ pub(super) fn explained(mut error: clap::Error) -> clap::Error {
     {
         let tip = "a number stands behind the option that it is for, such as --window -500,12345,512,512; with a file of \
                    that name, write ./ before it";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+        return error;
+    }
+    // A second name is where most programs have their result.
+    let name = match error.get(ContextKind::InvalidArg) {
+        Some(ContextValue::String(name)) if !name.starts_with('-') => Some(name.clone()),
+        _ => None,
+    };
+    if let Some(name) = name.filter(|_| error.kind() == ErrorKind::UnknownArgument)
+        && error.get(ContextKind::Usage).is_some_and(|usage| usage.to_string().contains("--out <"))
+    {
+        let tip = format!("to write the result there, use --out {}", escaped(&name));
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
         return error;
     }

@@ -175,8 +175,12 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
-    let tell =
-        Tell { quiet: cli.common.quiet, found: false, json: cli.common.progress == ProgressStyle::Json };
+    let tell = Tell {
+        quiet: cli.common.quiet,
+        found: false,
+        brief: false,
+        json: cli.common.progress == ProgressStyle::Json,
+    };
     let memory = Allowance::new(cli.common.memory);
     if memory.by_system {
         spare_address_space();
@@ -295,6 +299,8 @@ struct Tell {
     quiet: bool,
     /// What is told was found done.
     found: bool,
+    /// Of each stage one line is told, and what a user should know.
+    brief: bool,
     /// Errors are told as JSON, as progress is.
     json: bool,
 }
@@ -308,6 +314,11 @@ impl Tell {
     /// Tells a stage as one that was found done, if it was.
     fn found(self, found: bool) -> Self {
         Self { found, ..self }
+    }
+
+    /// Tells one line of each stage.
+    fn brief(self) -> Self {
+        Self { brief: true, ..self }
     }
 
     /// The first line of what is told of a stage.

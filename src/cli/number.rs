@@ -36,3 +36,34 @@ pub(super) fn exposure(text: &str) -> Result<f64, String> {
 pub(super) fn scale(text: &str) -> Result<f64, String> {
     number(text, "a number from 0.01 to 100", |number| (0.01..=100.0).contains(&number))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parser, with numbers that it takes and that it refuses: both sides of every bound.
+    type Case = (fn(&str) -> Result<f64, String>, &'static [&'static str], &'static [&'static str]);
+
+    #[test]
+    fn both_sides_of_every_bound_are_told_apart() {
+        let cases: [Case; 5] = [
+            (positive, &["1e-300", " 7 ", "1e300"], &["0", "-0", "-1"]),
+            (share, &["0", "1", "-0"], &["1.0000001", "-1e-9"]),
+            (white, &["0.001", "1000"], &["0.000999", "1000.1", "0"]),
+            (exposure, &["1e-6", "1e6"], &["9e-7", "1000001", "0"]),
+            (scale, &["0.01", "100"], &["0.0099", "100.1", "0"]),
+        ];
+        for (parse, taken, refused) in cases {
+            for text in taken {
+                assert_eq!(parse(text), Ok(text.trim().parse().unwrap_or(f64::NAN)), "{text}");
+            }
+            for text in refused.iter().chain(&["", "nan", "inf", "-inf", "1e999", "1,5", "0x10", "1 2"]) {
+                assert!(parse(text).is_err_and(|error| error.contains("expected a number")), "{text}");
+            }
+        }
+        assert_eq!((count("1"), count(" 18446744073709551615 ")), (Ok(1), Ok(usize::MAX)));
+        for text in ["0", "-1", "1.0", "18446744073709551616", ""] {
+            assert!(count(text).is_err_and(|error| error.contains("1 or more")), "{text}");
+        }
+    }
+}

@@ -13,6 +13,7 @@ pub mod picture;
 mod plane;
 pub mod radiometry;
 pub mod registration;
+mod repair;
 pub mod samples;
 pub mod statistics;
 

@@ -15,6 +15,12 @@ use crate::store::model::{Model, Stage};
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
 
+/// Colour differences are counted by steps of this.
+const COLOUR_STEP: f64 = 0.05;
+
+/// The last step: a colour difference of 100, or more.
+const COLOUR_STEPS: usize = 2000;
+
 /// What to compare.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -52,9 +58,21 @@ pub struct Errors {
     pub samples_left_out: u64,
     /// Mean CIEDE2000.
     pub ciede2000: f64,
+    /// The CIEDE2000 that 95 % of the texels' samples stay below or at, to 0.05; the last step stands for all above 100.
+    pub ciede2000_95: f64,
 }
 
 impl Errors {
+    /// Whether colours differ by much more than their lightness: texels of one lightness and several hues share clusters,
+    /// which are formed by lightness alone.
+    pub fn hues_are_lost(&self) -> bool {
+        /// A colour difference that is seen beside each other by everybody.
+        const SEEN: f64 = 3.0;
+        /// How many times the difference in lightness it is at least. Of one hue it is 1 or less.
+        const TIMES: f64 = 3.0;
+        self.ciede2000 > SEEN && self.ciede2000 > TIMES * self.lightness
+    }
+
     /// The ratio for people.
     pub fn psnr_text(&self) -> String {
         match (self.samples, self.psnr_db) {
@@ -77,7 +95,7 @@ pub enum Agreement {
     Undefined,
 }
 
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 struct Sums {
     views: usize,
     codes: u64,
@@ -87,11 +105,35 @@ struct Sums {
     left_out: u64,
     colour: f64,
     colour_count: u64,
+    /// Colour differences by steps of [`COLOUR_STEP`].
+    colours: Vec<u64>,
 }
 
 impl Sums {
+    fn add_colour(&mut self, difference: f64) {
+        self.colour += difference;
+        self.colour_count += 1;
+        let step = ((difference / COLOUR_STEP).ceil() as usize).min(COLOUR_STEPS);
+        self.colours.resize(COLOUR_STEPS + 1, 0);
+        self.colours[step] += 1;
+    }
+
+    /// The step that 95 % of the colour differences do not exceed.
+    fn most_colours(&self) -> f64 {
+        let mut below = 0;
+        let step = self.colours.iter().position(|count| {
+            below += count;
+            20 * below >= 19 * self.colour_count
+        });
+        step.unwrap_or(0) as f64 * COLOUR_STEP
+    }
+
     fn add(self, other: Self) -> Self {
+        let mut colours = self.colours;
+        colours.resize(other.colours.len().max(colours.len()), 0);
+        colours.iter_mut().zip(&other.colours).for_each(|(count, more)| *count += more);
         Self {
+            colours,
             views: self.views + other.views,
             codes: self.codes + other.codes,
             code_count: self.code_count + other.code_count,
@@ -103,7 +145,7 @@ impl Sums {
         }
     }
 
-    fn errors(self, view_theta_deg: Option<f64>) -> Errors {
+    fn errors(&self, view_theta_deg: Option<f64>) -> Errors {
         let samples = match (self.sample_count, self.squares) {
             (0, _) => Agreement::Undefined,
             (_, 0.0) => Agreement::Equal,
@@ -118,6 +160,7 @@ impl Sums {
             samples,
             samples_left_out: self.left_out,
             ciede2000: self.colour / self.colour_count.max(1) as f64,
+            ciede2000_95: self.most_colours(),
         }
     }
 }
@@ -161,8 +204,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
                 if number % stride == 0 {
                     let [a, b] =
                         [decoder.rgb(&window, measured), decoder.rgb(&representatives.samples, modelled)];
-                    sums.colour += ciede2000(lab(a), lab(b));
-                    sums.colour_count += 1;
+                    sums.add_colour(ciede2000(lab(a), lab(b)));
                 }
             }
             sums.code_count += description.lights.len() as u64;
@@ -179,12 +221,12 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     for view in order {
         let theta = (description.views[view].degrees().0 * 1e6).round() / 1e6;
         match elevations.last_mut() {
-            Some((last, group)) if *last == theta => *group = group.add(sums[view]),
-            _ => elevations.push((theta, sums[view])),
+            Some((last, group)) if *last == theta => *group = std::mem::take(group).add(sums[view].clone()),
+            _ => elevations.push((theta, sums[view].clone())),
         }
     }
     Ok(Report {
-        elevations: elevations.iter().map(|&(theta, sums)| sums.errors(Some(theta))).collect(),
+        elevations: elevations.iter().map(|(theta, sums)| sums.errors(Some(*theta))).collect(),
         all: sums.into_iter().fold(Sums::default(), Sums::add).errors(None),
         colour_texels: offsets.len().div_ceil(stride),
     })

@@ -104,16 +104,18 @@ pub(crate) fn publish(temporary: &Path, path: &Path) -> io::Result<()> {
 pub(crate) fn publish_new(temporary: &Path, path: &Path) -> io::Result<()> {
     File::open(temporary)?.sync_all()?;
     match fs::hard_link(temporary, path) {
-        // Some file systems have no second names.
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-            if path.symlink_metadata().is_ok() {
-                return Err(io::ErrorKind::AlreadyExists.into());
-            }
-            fs::rename(temporary, path)?;
-        }
+        // Some file systems have no second names: FAT, exFAT, some of FUSE.
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => rename_new(temporary, path)?,
         linked => linked?,
     }
     File::open(folder_of(path))?.sync_all()
+}
+
+/// Gives a file its name without a second one. The name is taken by an empty file first, which only one process can
+/// make, and which nobody but that one replaces.
+fn rename_new(temporary: &Path, path: &Path) -> io::Result<()> {
+    File::create_new(path)?;
+    fs::rename(temporary, path).inspect_err(|_| drop(fs::remove_file(path)))
 }
 
 /// A file or folder that is being made beside the place that it is to have. It holds a lock while it lives; dropped
@@ -545,6 +547,40 @@ mod tests {
         assert_eq!(storage.get_partial(&key, ByteRange::Suffix(5)).unwrap().unwrap(), "bytes");
         assert_eq!(fs::read_dir(folder.path().join("a/b")).unwrap().count(), 1);
         assert_eq!(storage.list().unwrap(), [key]);
+    }
+
+    /// As on a file system without hard links.
+    #[test]
+    fn a_name_is_taken_by_one_only_where_files_have_no_second_names_too() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result");
+        let taken = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for number in 0..8 {
+                let (path, taken) = (&path, &taken);
+                scope.spawn(move || {
+                    let temporary = path.with_file_name(format!("temporary-{number}"));
+                    fs::write(&temporary, format!("of {number}")).unwrap();
+                    match rename_new(&temporary, path) {
+                        Ok(()) => drop(taken.fetch_add(1, std::sync::atomic::Ordering::SeqCst)),
+                        Err(error) => assert_eq!(error.kind(), io::ErrorKind::AlreadyExists),
+                    }
+                });
+            }
+        });
+        assert_eq!(taken.into_inner(), 1);
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("of "), "{text}");
+        // What is another's stays, a link that leads nowhere too; and what cannot be renamed leaves no empty file.
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(folder.path().join("nowhere"), &link).unwrap();
+        let temporary = folder.path().join("temporary");
+        fs::write(&temporary, b"new").unwrap();
+        assert!(rename_new(&temporary, &path).is_err() && rename_new(&temporary, &link).is_err());
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        assert!(link.is_symlink() && temporary.exists());
+        assert!(rename_new(&folder.path().join("none"), &folder.path().join("free")).is_err());
+        assert!(!folder.path().join("free").exists());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! What lies on disk: Zarr v3 groups of arrays with attributes of ours (see `docs/design.md`, section 3).
+//! What lies on disk: Zarr v3 groups of arrays with attributes of ours (see `docs/reference/stores.md`).
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 
@@ -333,6 +333,7 @@ impl Store {
                 None => {
                     let expected = recognise::one_of(kinds);
                     Error::missing(format!("{}: no store here, expected {expected}", self.path.display()))
+                        .hint(recognise::how_made(kinds))
                 }
             });
         };

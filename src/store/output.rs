@@ -186,12 +186,17 @@ pub fn prepare_seeking(
     Ok(Ready { path: path.to_owned(), existing, temporary: (!found).then_some(temporary) })
 }
 
-/// Publishes files that belong together; written, if one of them was.
+/// Publishes files of one folder that belong together; written, if one of them was. Of two processes that publish at
+/// the same time the second begins when the first has done, so that what lies there at the end is of one of them.
 ///
 /// # Errors
 /// As [`Ready::publish`].
 pub fn publish_all(files: impl IntoIterator<Item = Ready>) -> Result<Made> {
-    files.into_iter().try_fold(Made::Found, |made, file| {
+    let mut files = files.into_iter().peekable();
+    // A folder can be locked without a file that would stay. Where a file system has no locks the work goes on without.
+    let folder = files.peek().and_then(|file| File::open(folder_of(&file.path)).ok());
+    let _ = folder.as_ref().map(File::lock);
+    files.try_fold(Made::Found, |made, file| {
         let published = file.publish()?;
         Ok(if made == Made::Written { made } else { published })
     })
@@ -268,7 +273,7 @@ fn compare_files(made: &Path, path: &Path) -> Result<()> {
 }
 
 /// Whether a file holds just these bytes; what is no file, or not there, does not.
-fn holds(path: &Path, bytes: &[u8]) -> Result<bool> {
+pub(crate) fn holds(path: &Path, bytes: &[u8]) -> Result<bool> {
     match MappedFile::open(path) {
         Ok(found) => Ok(found.as_ref() == bytes),
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::InvalidInput) => {

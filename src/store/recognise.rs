@@ -217,6 +217,10 @@ pub(super) fn another_kind(path: &Path, found: &Value, kinds: &[&str]) -> Error 
             error.hint(format!("enlarge it first: btf enlarge {place} NAME.zarr --size WIDTHxHEIGHT"))
         }
         (enlarged::KIND, [model::KIND, ..]) => error.hint("name the model that it was enlarged from"),
+        (enlarged::KIND, [measurement::KIND, ..]) => error.hint(format!(
+            "name the measurement that its model was made of; btf image, and btf export {place} NAME.dzi, make pictures \
+             of an enlarged index"
+        )),
         _ => error,
     }
 }
@@ -228,6 +232,16 @@ fn article(kind: &str) -> String {
         measurement::KIND | model::KIND => format!("a {kind}"),
         other => format!("a store of kind {}", json!(other)),
     }
+}
+
+/// What to do where nothing lies and a store of one of these kinds was expected.
+pub(super) fn how_made(kinds: &[&str]) -> String {
+    let command = match kinds {
+        [measurement::KIND, ..] => "btf import ARCHIVE NAME.zarr makes a measurement",
+        [enlarged::KIND, ..] => "btf enlarge MODEL NAME.zarr --size WIDTHxHEIGHT makes an enlarged index",
+        _ => "btf model MEASUREMENT NAME.model.zarr makes a model",
+    };
+    format!("look at the name and at the folder that it is in; {command}")
 }
 
 pub(super) fn one_of(kinds: &[&str]) -> String {

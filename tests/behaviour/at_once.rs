@@ -160,3 +160,33 @@ fn no_name_is_taken_before_all_are_known_to_be_free() {
         crate::fixture::fail(btf().arg("fit").arg(&copied).arg("--report").arg(folder.path().join("r")), 65);
     assert!(told.contains("r.png") && !folder.path().join("r.txt").exists(), "{told}");
 }
+
+/// An array and what lies beside it are of one measurement, whoever comes last.
+#[test]
+fn of_two_arrays_that_replace_each_other_nothing_is_mixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let stores = ["2", "3"].map(|views| {
+        let (archive, store) = (at(&format!("{views}.zip")), at(&format!("{views}.zarr")));
+        let sizes = ["--size", "8x8", "--views", views, "--lights", views];
+        crate::fixture::succeed(btf().arg("sample").arg(&archive).args(sizes));
+        crate::fixture::succeed(btf().arg("import").args([&archive, &store]));
+        store
+    });
+    let export = |store: &Path, name: &str| {
+        let mut command = btf();
+        command.arg("export").arg(store).arg(at(name).join("e.npy")).arg("--force");
+        command
+    };
+    let alone = stores.iter().zip(["alone-2", "alone-3"]).map(|(store, name)| {
+        crate::fixture::succeed(&mut export(store, name));
+        made(&at(name))
+    });
+    let alone: Vec<_> = alone.collect();
+    for _ in 0..12 {
+        let [(first, _), (second, _)] =
+            both([&mut export(&stores[0], "both"), &mut export(&stores[1], "both")]);
+        assert_eq!((first, second), (Some(0), Some(0)));
+        assert!(alone.contains(&made(&at("both"))), "a mixture of two measurements");
+    }
+}

@@ -593,3 +593,66 @@ fn a_measurement_that_shows_nothing_has_a_fault_and_passes_no_other_check() {
     assert_eq!((plain.len(), plain[0].severity, plain[0].directions.len()), (1, Severity::Suspicion, 2));
     assert!(some.findings().all(|finding| finding.code != "duplicate-image"));
 }
+
+/// Advice is what `btf import` is to be told in all: an option that was given is left out where it was wrong, and never
+/// advised again.
+#[test]
+fn advice_takes_account_of_the_options_that_were_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let sizes = ["--size", "40x40", "--views", "25", "--lights", "25"];
+    succeed(btf().arg("sample").arg(at("s.zip")).args(sizes));
+    let repairs = |source: &std::path::Path, options: &[&str]| {
+        let output = btf().arg("check").arg(source).args(options).arg("--json").output().unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let checks = report["checks"].as_array().unwrap().iter();
+        let findings = checks.flat_map(|check| check["findings"].as_array().unwrap().clone());
+        findings.map(|finding| finding["repair"].as_str().unwrap_or("none").to_owned()).collect::<Vec<_>>()
+    };
+    for (options, expected) in [
+        (&["--swap"][..], "without --swap"),
+        (&["--azimuth", "mirrored"], "without --azimuth"),
+        (&["--azimuth", "mirrored-lights"], "without --azimuth"),
+        (&["--turn", "90"], "--turn 180"),
+        (&["--transpose"], "without --transpose"),
+        (&["--samples", "f16", "--swap"], "--samples f16, without --swap"),
+    ] {
+        assert_eq!(repairs(&at("s.zip"), options), [expected], "{options:?}");
+        // The same of a store that was made so.
+        let store = at(&format!("{}.zarr", options.concat()));
+        succeed(btf().arg("import").args([&at("s.zip"), &store]).args(options));
+        assert_eq!(repairs(&store, &[]), [expected], "{options:?}");
+    }
+    // The cosine is in the samples already once too often: nothing asks for it again.
+    for repair in repairs(&at("s.zip"), &["--cosine", "excluded"]) {
+        assert_ne!(repair, "--cosine excluded");
+    }
+    // Whoever follows the advice has nothing left to repair.
+    assert!(repairs(&at("s.zip"), &[]).is_empty());
+}
+
+#[test]
+fn many_duplicates_are_told_by_the_views_or_lights_that_they_are_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let [archive, pictures] = ["s.zip", "s"].map(|name| folder.path().join(name));
+    let sizes = ["--size", "32x32", "--views", "25", "--lights", "25"];
+    succeed(btf().arg("sample").arg(&archive).args(sizes));
+    let mut files = crate::fixture::unpack(&archive, &pictures);
+    files.sort();
+    // By views as they are sorted by name, 25 lights each: one view stands for another.
+    let view_of = |path: &std::path::Path| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        name[name.find("tv").unwrap()..].to_owned()
+    };
+    let mut views: Vec<String> = files.iter().map(|file| view_of(file)).collect();
+    views.sort();
+    views.dedup();
+    let of_view = |view: &str| -> Vec<_> { files.iter().filter(|file| view_of(file) == view).collect() };
+    for (from, to) in of_view(&views[9]).into_iter().zip(of_view(&views[17])) {
+        std::fs::copy(from, to).unwrap();
+    }
+    let output = btf().arg("check").arg(&pictures).output().unwrap();
+    let told = String::from_utf8_lossy(&output.stdout);
+    let line = told.lines().find(|line| line.contains("equal in every sample")).unwrap();
+    assert!(line.contains("under 25 lights") && line.matches("view ").count() == 2, "{line}");
+}

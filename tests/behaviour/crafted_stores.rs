@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::coherent_damage::change;
 use crate::damaged_stores::{Copy, seal_again, with_context};
-use crate::fixture::tree_names;
+use crate::fixture::{assert_same, btf, fail, fixture, succeed, tree_names};
 
 /// What `verify` says of a store: its findings, or the error that keeps it from looking.
 fn told(store: &Path, context: &Context<'_>) -> String {
@@ -111,6 +111,22 @@ fn numbers_that_no_model_has_are_found_behind_right_checksums() {
 }
 
 #[test]
+fn chunks_that_cannot_be_decoded_are_found_behind_right_checksums() {
+    let copy = Copy::new();
+    let model = copy.place("m.zarr");
+    let file = model.join("representatives/c/0/0/0/0");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&file, bytes).unwrap();
+    with_context(|context| {
+        declare(&model, Stage::Cluster, context).unwrap();
+        let told = told(&model, context);
+        assert!(told.contains("representatives: ") && !told.contains("not the one"), "{told}");
+    });
+}
+
+#[test]
 fn attributes_that_no_model_has_are_found_behind_right_seals() {
     let copy = Copy::new();
     let model = copy.place("m.zarr");
@@ -143,6 +159,9 @@ fn attributes_that_no_model_has_are_found_behind_right_seals() {
         (vec![("fit/report/levels/0/eta", json!(4097))], "level 0: got 4097 sites"),
         (vec![("fit/recipe/levels", json!(0)), ("fit/report/levels", json!([]))], "got 0 levels"),
         (vec![("appearance/report/wraps", json!(false))], "wraps false, of a tile"),
+        (vec![("cluster/report/passes", json!(null))], "report of cluster"),
+        (vec![("cluster/report/index_bytes", json!(-1))], "report of cluster"),
+        (vec![("normals/report/lights", json!(-1))], "report of normals"),
     ];
     for (changes, words) in cases {
         for (member, value) in &changes {
@@ -219,6 +238,75 @@ fn what_no_enlargement_has_is_found_behind_right_checksums_and_seals() {
     change(&file, "/attributes/btfkit/checksums", None);
     let told = with_context(|context| told(&store, context));
     assert!(told.contains("was not declared finished"), "{told}");
+}
+
+/// The enlargement of several shards, the last of each row and column cut off by the border, without one file of each
+/// array in turn: told as missing, not declared finished, and made again by the same command.
+#[test]
+fn an_enlargement_without_a_shard_of_any_array_is_not_whole_and_is_mended() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("big.zarr");
+    let verify = || {
+        let mut command = btf();
+        command.arg("verify").arg(&store).arg("--model").arg(fixture().model());
+        command
+    };
+    let make_at = |place: &Path| {
+        let mut command = btf();
+        command.arg("enlarge").args([&fixture().model(), place]).args([
+            "--size",
+            "530x700",
+            "--keep-normals",
+        ]);
+        command
+    };
+    let (make, whole) = (|| make_at(&store), folder.path().join("whole.zarr"));
+    succeed(&mut make_at(&whole));
+    succeed(&mut make());
+    for array in ["index", "source", "normals"] {
+        for file in tree_names(&store.join(array).join("c")) {
+            std::fs::remove_file(&file).unwrap();
+            let output = verify().output().unwrap();
+            let told = String::from_utf8_lossy(&output.stdout);
+            assert_eq!(output.status.code(), Some(66), "{told}");
+            assert!(told.contains("1 of 4 shards have not been written") == (array == "index"), "{told}");
+            succeed(&mut make());
+            assert_same(&store, &whole);
+            // Another shard of the array in its place, whole in itself.
+            let bytes = std::fs::read(&file).unwrap();
+            let other = tree_names(&store.join(array).join("c")).into_iter().find(|other| *other != file);
+            std::fs::copy(other.unwrap(), &file).unwrap();
+            fail(&mut verify(), 65);
+            std::fs::write(&file, bytes).unwrap();
+        }
+    }
+    succeed(&mut verify());
+    // Arrays that the recipe says are there.
+    for array in ["source", "normals"] {
+        let moved = folder.path().join("moved");
+        std::fs::rename(store.join(array), &moved).unwrap();
+        fail(&mut verify(), 66);
+        std::fs::rename(&moved, store.join(array)).unwrap();
+    }
+    // What is written in part is not declared finished.
+    let part = folder.path().join("part.zarr");
+    let made = Enlarged::open(&whole).unwrap();
+    let tile = made.tile().unwrap();
+    let (size, clusters) = (made.size(), made.clusters());
+    let description = Description { size, clusters, tile, keep_source: true, keep_normals: true };
+    let recipe = made.attributes().unwrap()["recipe"].clone();
+    with_context(|context| {
+        let model = fixture().model();
+        let enlarged = Enlarged::create(&part, &description, &recipe, &model, context).unwrap();
+        let window = Window { y: 0, x: 0, size: Size::new(512, 530) };
+        let texels = window.size.texels();
+        let (index, source, normals) = (vec![0; texels], vec![0; texels], vec![0.0; 3 * texels]);
+        enlarged.write(window, Texels { index: &index, source: &source, normals: &normals }).unwrap();
+        enlarged.finish(context).unwrap();
+        assert!(!enlarged.attributes().unwrap().contains_key("checksums"));
+    });
+    // A model has no archive to be compared with.
+    fail(btf().arg("verify").arg(fixture().model()).arg("--source").arg(fixture().archive()), 2);
 }
 
 /// Changes a member of our attributes, with a seal that is right again but digests as they are told.
@@ -321,4 +409,60 @@ fn what_no_pyramid_has_is_found_behind_right_seals() {
     std::fs::copy(tiles.join("0/0_0.png"), tiles.join("1/0_0.png")).unwrap();
     let found = with_context(|context| told(&tiles, context));
     assert!(found.contains("got a tile of 1x1, expected 2x1"), "{found}");
+}
+
+/// Every file of a pyramid taken away, made undecodable, and exchanged for that of another: of each kind it is told what
+/// it is, and the same command mends it.
+#[test]
+fn files_of_a_pyramid_that_are_missing_or_of_another_are_told_and_mended() {
+    let copy = Copy::new();
+    let (tiles, description) = (copy.place("p_files"), copy.place("p.dzi"));
+    let mut export = btf();
+    export.arg("export").args([copy.place("coherent.zarr"), description.clone()]).args(["--tile-size", "16"]);
+    succeed(&mut export);
+    let export_other = || {
+        let mut command = btf();
+        command.arg("export").args([copy.place("coherent.zarr"), copy.place("q.dzi")]).args([
+            "--tile-size",
+            "8",
+            "--overlap",
+            "0",
+        ]);
+        command
+    };
+    succeed(&mut export_other());
+    let verify = |words: &str| {
+        let found = with_context(|context| told(&description, context));
+        assert!(found.contains(words) && (!words.is_empty() || found.is_empty()), "{words}: {found}");
+    };
+    verify("");
+    for (file, other) in [("p.dzi", "q.dzi"), ("p.html", "q.html")] {
+        let (file, other) = (copy.place(file), copy.place(other));
+        let whole = std::fs::read(&file).unwrap();
+        std::fs::remove_file(&file).unwrap();
+        verify(&format!("{}: it is not there", file.display()));
+        std::fs::copy(other, &file).unwrap();
+        verify(&format!("{}: not the text that follows from the recipe", file.display()));
+        std::fs::write(&file, whole).unwrap();
+    }
+    for file in tree_names(&tiles).into_iter().filter(|file| file.extension().is_some_and(|e| e == "png")) {
+        let whole = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &whole[..whole.len() - 20]).unwrap();
+        verify(&format!("{}: ", file.display()));
+        let found = with_context(|context| told(&description, context));
+        assert!(!found.contains("checksum"), "{found}");
+        std::fs::remove_file(&file).unwrap();
+        verify(&format!("{}: no such tile", file.display()));
+        succeed(&mut export);
+        assert_eq!(std::fs::read(&file).unwrap(), whole);
+    }
+    verify("");
+    // Of one that was interrupted early the first few are told.
+    let other = copy.place("q_files");
+    for file in tree_names(&other).into_iter().filter(|file| file.extension().is_some_and(|e| e == "png")) {
+        std::fs::remove_file(file).unwrap();
+    }
+    let found = with_context(|context| told(&copy.place("q.dzi"), context));
+    let (missing, tiles) = (found.matches("no such tile").count(), 5 * 4 + 3 * 2 + 2 + 1 + 1 + 1 + 1);
+    assert!((20..tiles).contains(&missing), "{missing}: {found}");
 }

@@ -294,6 +294,45 @@ fn another_recipe_and_other_files_are_refused() {
     fail(&mut export(&fixture().enlarged(), &folder.path().join("a.png")), 2);
 }
 
+/// A page or a description of another's in a pyramid's place is never taken for its own, nor replaced unasked.
+#[test]
+fn files_of_others_beside_the_tiles_are_refused_and_losses_are_told_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("big.dzi");
+    let run = || {
+        let mut command = export(&fixture().model(), &output);
+        command.args(["--exposure", "20"]);
+        command
+    };
+    let told = succeed(&mut run());
+    let losses =
+        |told: &str| told.lines().filter(|line| line.contains("not held")).collect::<Vec<_>>().join(" ");
+    assert!(losses(&told).contains("values above white"), "{told}");
+    let whole = tree(folder.path());
+    // Found done, all at once or after the end was lost.
+    assert_eq!(losses(&succeed(&mut run())), losses(&told));
+    std::fs::remove_file(&output).unwrap();
+    assert_eq!(losses(&succeed(&mut run())), losses(&told));
+    assert!(whole == tree(folder.path()));
+    for name in ["big.html", "big.dzi"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, "mine").unwrap();
+        let told = fail(&mut run(), 65);
+        assert!(told.contains(&format!("{name} exists")) && told.contains("--force"), "{told}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+        succeed(run().arg("--force"));
+        assert!(whole == tree(folder.path()));
+        // What is no file is not replaced by force either.
+        std::fs::remove_file(&path).unwrap();
+        std::os::unix::fs::symlink(folder.path().join("elsewhere"), &path).unwrap();
+        fail(run().arg("--force"), 65);
+        assert!(path.is_symlink());
+        std::fs::remove_file(&path).unwrap();
+        succeed(&mut run());
+        assert!(whole == tree(folder.path()));
+    }
+}
+
 #[test]
 fn jpeg_tiles_are_near_the_picture() {
     let folder = tempfile::tempdir().unwrap();

@@ -97,3 +97,66 @@ fn wavelengths_and_components_that_are_left_out_are_named() {
     let told = succeed(btf().arg("export").arg(fixture().measurement()).arg(folder.path().join("e8.zip")));
     assert!(!told.contains("note"), "{told}");
 }
+
+/// Of samples that are no numbers the ratio of signal and noise is taken without them, and says so; of nothing else
+/// there is none.
+#[test]
+fn a_comparison_leaves_out_what_is_no_number_and_counts_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let compare = |store: &Path, clusters: &str| -> serde_json::Value {
+        let model = store.with_extension(format!("{clusters}.model.zarr"));
+        let mut tile = btf();
+        succeed(tile.arg("tile").args([store, &model]).args(["--tile", "none"]));
+        succeed(btf().arg("cluster").args([store, &model]).args(["--clusters", clusters]));
+        let told = succeed(btf().arg("compare").args([&model, store]).arg("--json"));
+        serde_json::from_str::<serde_json::Value>(&told).unwrap()["all"].clone()
+    };
+    // One texel of 64 under 3 lights holds none, of 3 channels.
+    let some = folder.path().join("some");
+    let store = measurement(&some, &["R", "G", "B"], true);
+    let all = compare(&store, "4");
+    assert_eq!(all["samples_left_out"], 9, "{all}");
+    assert_eq!(all["samples"], "different", "{all}");
+    assert!(all["psnr_db"].as_f64().is_some_and(f64::is_finite), "{all}");
+    let told = succeed(btf().arg("compare").arg(store.with_extension("4.model.zarr")).arg(&store));
+    assert!(told.contains("9 samples"), "{told}");
+    // A cluster for every texel: equal.
+    let none = folder.path().join("none");
+    let all = compare(&measurement(&none, &["R", "G", "B"], false), "64");
+    assert_eq!((&all["samples_left_out"], &all["samples"]), (&0.into(), &"equal".into()), "{all}");
+    assert!(all["psnr_db"].is_null(), "{all}");
+}
+
+/// Clusters are formed by lightness: texels of one lightness and two hues share one, and the comparison warns of it.
+#[test]
+fn hues_that_clusters_do_not_tell_apart_are_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let compare = |name: &str, halves: [[f32; 3]; 2]| {
+        let pictures = folder.path().join(name);
+        std::fs::create_dir_all(&pictures).unwrap();
+        for phi in [0, 90, 180] {
+            let samples = (0..64).flat_map(|texel| halves[texel % 2]).collect();
+            let channels = ["R", "G", "B"].map(str::to_owned).to_vec();
+            let picture = Picture { width: 8, height: 8, channels, samples: Samples::F32(samples) };
+            let bytes = exr::encode(&picture, exr::Compression::Zip).unwrap();
+            std::fs::write(pictures.join(format!("tv0_pv0_tl30_pl{phi}.exr")), bytes).unwrap();
+        }
+        let [store, model] = ["zarr", "model.zarr"].map(|ending| pictures.with_extension(ending));
+        succeed(btf().arg("import").args([&pictures, &store]));
+        succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
+        succeed(btf().arg("cluster").args([&store, &model]).args(["--clusters", "1"]));
+        let figures = succeed(btf().arg("compare").args([&model, &store]).arg("--json"));
+        let figures: serde_json::Value = serde_json::from_str(&figures).unwrap();
+        (succeed(btf().arg("compare").args([&model, &store])), figures["all"].clone())
+    };
+    // Red and green of one luminance.
+    let (told, all) = compare("hues", [[0.6, 0.1, 0.1], [0.1, 0.2486, 0.1]]);
+    assert!(told.contains("warning: colours are off by") && told.contains("--clusters"), "{told}");
+    // One half is the representative; of the other half each is far away, so that 95 % are not nearer than that.
+    let [mean, most] = ["ciede2000", "ciede2000_95"].map(|name| all[name].as_f64().unwrap());
+    assert!(mean > 15.0 && (most - 2.0 * mean).abs() < 0.1, "{all}");
+    assert!(all["lightness"].as_f64().unwrap() < 0.5, "{all}");
+    // Two lightnesses of one hue are as far apart in colour as in lightness.
+    let (told, all) = compare("greys", [[0.2, 0.2, 0.2], [0.4, 0.4, 0.4]]);
+    assert!(!told.contains("warning"), "{told} {all}");
+}

@@ -8,7 +8,7 @@ use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use btfkit_formats::Samples;
 
-use crate::fixture::{btf, fixture, succeed};
+use crate::fixture::{btf, copy, fail, fixture, succeed};
 
 /// The 8-bit pixels of `btf image` at a view and a light of the fixture.
 pub fn pixels(source: &Path, view: usize, light: usize, more: &[&str]) -> Vec<u8> {
@@ -206,4 +206,44 @@ fn the_report_of_a_fit_is_a_table_and_a_sheet() {
     let sheet = std::io::BufReader::new(std::fs::File::open(folder.path().join("field.png")).unwrap());
     let reader = png::Decoder::new(sheet).read_info().unwrap();
     assert_eq!((reader.info().width, reader.info().height), (1120, 920));
+}
+
+/// A picture that needs nothing but what is there is made, and says what is not; one that needs more says how much is
+/// missing.
+#[test]
+fn a_picture_of_a_store_that_is_not_complete_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let [store, enlarged] = ["half.zarr", "big.zarr"].map(|name| folder.path().join(name));
+    succeed(btf().arg("import").args([&fixture().archive(), &store]).args(["--shard", "0/2"]));
+    let image = |store: &Path, name: &str| {
+        let mut command = btf();
+        command.arg("image").arg(store).arg("--out").arg(folder.path().join(name));
+        command
+    };
+    let told = succeed(&mut image(&store, "there.png"));
+    assert!(told.contains("half.zarr is not complete, 4 of 9 views are missing"), "{told}");
+    let told = fail(image(&store, "absent.png").args(["--view", "20,15"]), 66);
+    assert!(told.contains("4 of 9 views are missing") && told.contains("goes on where it stopped"), "{told}");
+    let zoom = folder.path().join("there.dzi");
+    for _ in 0..2 {
+        let told = succeed(btf().arg("export").args([&store, &zoom]));
+        assert!(told.contains("note: ") && told.contains("4 of 9 views are missing"), "{told}");
+    }
+    copy(&fixture().enlarged(), &enlarged);
+    std::fs::remove_file(enlarged.join("index/c/1/1")).unwrap();
+    let model = fixture().model();
+    let with = |window: &str, name: &str| {
+        let mut command = image(&enlarged, name);
+        command.arg("--model").arg(&model).args(["--window", window]);
+        command
+    };
+    let told = succeed(&mut with("0,0,64,64", "corner.png"));
+    assert!(told.contains("big.zarr is not complete, 1 of 4 shards are missing"), "{told}");
+    let told = fail(&mut with("500,600,30,90", "end.png"), 66);
+    assert!(told.contains("1 of 4 shards are missing"), "{told}");
+    let told = succeed(image(&fixture().measurement(), "whole.png").args(["--view", "20,15"]));
+    assert!(!told.contains("missing"), "{told}");
+    // Whoever names the picture without the option is told which.
+    let told = fail(btf().arg("image").arg(&store).arg("a.png"), 2);
+    assert!(told.contains("use --out a.png"), "{told}");
 }

@@ -181,3 +181,62 @@ fn two_processes_with_one_recipe_make_one_store() {
     assert!(first.wait().unwrap().success() && second.wait().unwrap().success());
     crate::fixture::assert_same(&store, &fixture().measurement());
 }
+
+#[test]
+fn an_imports_recipe_names_all_that_its_bytes_depend_on() {
+    const KEYS: [&str; 14] = [
+        "assumptions",
+        "channels",
+        "codec",
+        "format",
+        "images",
+        "lights",
+        "method",
+        "reading",
+        "samples",
+        "size",
+        "stage",
+        "transfer",
+        "views",
+        "white",
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let sample = |name: &str, size: &str, views: &str, lights: &str, seed: &str| {
+        let counts = ["--size", size, "--views", views, "--lights", lights, "--seed", seed];
+        succeed(btf().arg("sample").arg(at(name)).args(counts));
+    };
+    sample("base.zip", "16x16", "3", "4", "1");
+    sample("size.zip", "16x24", "3", "4", "1");
+    sample("views.zip", "16x16", "2", "4", "1");
+    sample("lights.zip", "16x16", "3", "3", "1");
+    sample("seed.zip", "16x16", "3", "4", "2");
+    succeed(btf().arg("import").args([at("base.zip"), at("base.zarr")]));
+    succeed(btf().arg("export").args([at("base.zarr"), at("base.npy")]));
+    let recipe = |source: &str, options: &[&str]| {
+        let mut import = btf();
+        import.arg("import").args([at(source), at("new.zarr")]).args(options).arg("--dry-run");
+        let plan: serde_json::Value = serde_json::from_str(&succeed(&mut import)).unwrap();
+        plan["recipe"].as_object().unwrap().clone()
+    };
+    let base = recipe("base.zip", &[]);
+    let mut keys: Vec<&str> = base.keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    assert_eq!(keys, KEYS);
+    assert!(KEYS.iter().all(|&key| key == "assumptions" || !base[key].is_null()), "{base:?}");
+    for (source, options, key) in [
+        ("size.zip", &[][..], "size"),
+        ("views.zip", &[], "views"),
+        ("lights.zip", &[], "lights"),
+        ("seed.zip", &[], "images"),
+        ("base.npy", &[], "format"),
+        ("base.zip", &["--swap"], "reading"),
+        ("base.zip", &["--transfer", "linear"], "transfer"),
+        ("base.zip", &["--white", "0.5"], "white"),
+        ("base.zip", &["--codec", "predictive"], "codec"),
+        ("base.zip", &["--samples", "u16"], "samples"),
+    ] {
+        let other = recipe(source, options);
+        assert!(other[key] != base[key], "{source} {options:?} {key}: {}", other[key]);
+    }
+}

@@ -832,3 +832,68 @@ fn less_address_space_than_it_takes_is_an_error_of_the_system_and_no_advice_to_a
         succeed(&mut limited(400_000, &command));
     }
 }
+
+/// The table of docs/safety.md, row by row: a command that ends with each code, and no other code is in the table.
+#[test]
+fn exit_codes_are_those_of_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let at = |name: &str| text(&folder.path().join(name));
+    let [archive, measurement, model] =
+        [fixture().archive(), fixture().measurement(), fixture().model()].map(|path| text(&path));
+    fs::write(at("mine.png"), "mine").unwrap();
+    fs::write(at("damaged.zip"), &fs::read(&archive).unwrap()[..5000]).unwrap();
+    std::os::unix::fs::symlink(at("nowhere"), at("link.zarr")).unwrap();
+    succeed(btf().args(["tile", &measurement, &at("tile.zarr")]));
+    // Stopped at the first signal while it waits for a stage that another process holds.
+    let stopped = || {
+        let held = fs::File::create(at("tile.zarr/.lock-normals")).unwrap();
+        held.lock().unwrap();
+        let mut child = btf()
+            .args(["normals", &measurement, &at("tile.zarr")])
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        wait_for(&mut child, "waiting");
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+        child.wait().unwrap().code()
+    };
+    let code = |arguments: &[&str]| btf().args(arguments).output().unwrap().status.code();
+    let cases: &[(i32, &str, &dyn Fn() -> Option<i32>)] = &[
+        (0, "done", &|| code(&["info", &measurement])),
+        (0, "found done", &|| code(&["import", &archive, &measurement])),
+        (1, "a limit", &|| {
+            let large = ["sample", &at("large.zip"), "--size", "1000x1000"].map(str::to_owned);
+            limited("ulimit -v 150000", &large).output().unwrap().status.code()
+        }),
+        (2, "unknown option", &|| code(&["info", &measurement, "--no-such-option"])),
+        (2, "no number", &|| code(&["image", &model, "--out", &at("i.png"), "--exposure", "nan"])),
+        (2, "little memory", &|| code(&["check", &measurement, "--memory", "1MiB"])),
+        (65, "damaged", &|| code(&["import", &at("damaged.zip"), &at("damaged.zarr")])),
+        (65, "another recipe", &|| code(&["import", &archive, &measurement, "--white", "0.5"])),
+        (65, "a file that exists", &|| code(&["image", &model, "--out", &at("mine.png")])),
+        (65, "another kind", &|| code(&["fit", &measurement])),
+        (66, "no such path", &|| code(&["info", &at("nothing")])),
+        (66, "a link to nowhere", &|| code(&["info", &at("link.zarr")])),
+        (66, "a stage not run", &|| code(&["fit", &at("tile.zarr")])),
+        (74, "no folder can be there", &|| code(&["image", &model, "--out", &at("mine.png/i.png")])),
+        (74, "no room", &|| {
+            let image = ["image", &model, "--out", &at("i.png")].map(str::to_owned);
+            limited("ulimit -f 0", &image).output().unwrap().status.code()
+        }),
+        (75, "stopped", &stopped),
+    ];
+    for (expected, what, run) in cases {
+        assert_eq!(run(), Some(*expected), "{what}");
+    }
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/safety.md")).unwrap();
+    let (_, table) = page.split_once("## Exit codes").unwrap();
+    let rows =
+        table.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
+    let told: Vec<i32> =
+        rows.filter_map(|row| row.split('|').nth(1).and_then(|cell| cell.trim().parse().ok())).collect();
+    let mut tried: Vec<i32> = cases.iter().map(|(code, _, _)| *code).collect();
+    tried.dedup();
+    assert_eq!(told, tried);
+}

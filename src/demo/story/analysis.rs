@@ -18,8 +18,8 @@ pub(super) fn measured(settings: &Settings) -> Section {
         "<p>The archive holds {count} photographs of {size} texels: {n} lights for each of {n} views, \
          rectified, in the layout of the Bonn UBO2003 sets. The material is rendered from a seeded height \
          field with shadows, masking and gloss, so the demo needs no download; every later step reads the \
-         archive as it would a measured one. Angles are the elevation from the surface normal and the \
-         azimuth, counter-clockwise from the right.</p>",
+         archive as it would a measured one. Directions are the polar angle θ from the surface normal and the \
+         azimuth φ, counter-clockwise from the right.</p>",
         size = settings.sample,
         n = settings.directions,
     );
@@ -76,7 +76,7 @@ pub(super) fn clusters(figures: &Figures) -> Section {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let intro = format!(
         "<p>The tile's texels are clustered by their whole reflectance, L* under all pairs of directions, \
-         views weighted by the cosine of their elevation (equation (1)): <b>{} clusters</b> after {} passes, \
+         views weighted by the cosine of their polar angle (equation (1)): <b>{} clusters</b> after {} passes, \
          {} of a single texel. The objective, the mean weighted |ΔL*| of a texel, is <b>{error:.3}</b> from \
          the centres and {:.3} from the representatives, the measured colour BRDFs that stand for the \
          clusters.</p>",
@@ -113,6 +113,7 @@ pub(super) fn clusters(figures: &Figures) -> Section {
             format!("{:.3}", errors.lightness),
             errors.psnr_text(),
             format!("{:.3}", errors.ciede2000),
+            format!("{:.2}", errors.ciede2000_95),
         ]
     });
     let table = Table {
@@ -120,7 +121,7 @@ pub(super) fn clusters(figures: &Figures) -> Section {
             "The tile by the model against the measured tile, all lights (CIEDE2000 over {} texels)",
             figures.compare.colour_texels
         ),
-        head: vec!["View elevation", "Views", "Mean |ΔL*|", "PSNR, dB", "CIEDE2000"],
+        head: vec!["View θ", "Views", "Mean |ΔL*|", "PSNR, dB", "CIEDE2000", "95 % of it"],
         rows: rows.collect(),
     };
     Section {

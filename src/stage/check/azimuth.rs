@@ -345,7 +345,7 @@ fn together(lights: Reading, views: bool) -> Option<(&'static str, String, Optio
             "images-turned",
             format!(
                 "images are turned by 90 degrees against the directions: {by}; a further turn by 180 degrees \
-                 (--turn 270) would only make hills of valleys, which this does not tell"
+                 would only make hills of valleys, which this does not tell"
             ),
             Some("--turn 90"),
         )),

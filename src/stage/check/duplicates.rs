@@ -4,12 +4,12 @@
 //! photograph stored twice with another compression, but images with light and view exchanged may come near to it on a
 //! flat material (reciprocity), so that they are not looked at.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use serde_json::json;
 
 use super::angular::angle;
-use super::finding::{Check, Finding, Place, Severity, confidence, names, round};
+use super::finding::{Check, Finding, Place, Severity, confidence, round};
 use super::statistics::Statistics;
 use crate::words::counted;
 use btfkit_formats::Direction;
@@ -89,7 +89,10 @@ pub fn check(statistics: &Statistics) -> Check {
             confidence: 1.0,
             message: format!(
                 "images of different directions are equal in every sample: {}",
-                names(&places, statistics)
+                grouped(
+                    equal.iter().flat_map(|group| group[1..].iter().map(|&other| [group[0], other])),
+                    statistics
+                )
             ),
             evidence: json!({"groups": equal}),
             repair: None,
@@ -110,7 +113,7 @@ pub fn check(statistics: &Statistics) -> Check {
             confidence: confidence(NEARLY / least.max(1e-9)),
             message: format!(
                 "images of different directions are nearly equal: {}",
-                names(&places, statistics)
+                grouped(near.iter().map(|&(a, b, _)| [a, b]), statistics)
             ),
             evidence: json!({"pairs": pairs, "threshold": NEARLY}),
             repair: None,
@@ -148,6 +151,42 @@ fn equal(candidates: &[Candidate<'_>]) -> Vec<Vec<(usize, usize)>> {
         .collect();
     groups.sort();
     groups
+}
+
+/// Pairs of images in words: those of two views under one light each are told together, and those of two lights; the
+/// largest groups first.
+fn grouped(pairs: impl Iterator<Item = [(usize, usize); 2]>, statistics: &Statistics) -> String {
+    const NAMED: usize = 6;
+    let mut groups: BTreeMap<[Place; 2], Vec<[(usize, usize); 2]>> = BTreeMap::new();
+    for pair in pairs {
+        let [a, b] = pair;
+        let key = match (a.0 == b.0, a.1 == b.1) {
+            (false, true) => [a, b].map(|(view, _)| Place::view(view)),
+            (true, false) => [a, b].map(|(_, light)| Place::light(light)),
+            _ => [a, b].map(|(view, light)| Place::image(view, light)),
+        };
+        groups.entry(key).or_default().push(pair);
+    }
+    let mut groups: Vec<_> = groups.into_iter().collect();
+    groups.sort_by_key(|(_, pairs)| std::cmp::Reverse(pairs.len()));
+    let told = |(key, pairs): &([Place; 2], Vec<[(usize, usize); 2]>)| {
+        let [a, b] = key.map(|place| place.named(statistics));
+        let [(view, light), _] = pairs[0];
+        let shared = match (key[0], pairs.len()) {
+            (Place { light: None, .. }, 1) => format!(" under {}", Place::light(light).named(statistics)),
+            (Place { view: None, .. }, 1) => format!(" from {}", Place::view(view).named(statistics)),
+            (Place { light: None, .. }, count) => format!(" under {}", counted(count, "light")),
+            (Place { view: None, .. }, count) => format!(" from {}", counted(count, "view")),
+            _ => String::new(),
+        };
+        format!("{a} and {b}{shared}")
+    };
+    let mut texts: Vec<String> = groups.iter().take(NAMED).map(told).collect();
+    if let Some(left @ [_, ..]) = groups.get(NAMED..) {
+        let pairs = left.iter().map(|(_, pairs)| pairs.len()).sum::<usize>();
+        texts.push(format!("and {} more", counted(pairs, "pair")));
+    }
+    texts.join("; ")
 }
 
 fn same(a: &Candidate<'_>, b: &Candidate<'_>) -> bool {

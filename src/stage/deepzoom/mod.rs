@@ -11,7 +11,7 @@ pub mod pyramid;
 mod verify;
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use btfkit_formats::{Direction, jpeg};
@@ -34,6 +34,9 @@ pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
 pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
+
+/// The member of the state of a finished pyramid that tells what its tiles do not hold.
+const NOTES: &str = "notes";
 
 /// Memory for what does not grow with the picture: the program itself, threads, packers.
 const FIXED_BYTES: u64 = 16 << 20;
@@ -112,7 +115,7 @@ pub struct Report {
     pub tiles_found: u64,
     /// Tiles written by this run.
     pub tiles_written: u64,
-    /// What tiles do not hold, a sentence each; of a run that found all of them nothing is known.
+    /// What tiles do not hold, a sentence each.
     pub notes: Vec<String>,
 }
 
@@ -148,7 +151,9 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
     });
     place.check(&recipe, context.existing)?;
     let pyramid = Pyramid { size: scene.size(), side, overlap };
-    Ok(Plan { scene, pyramid, encoding: options.encoding, place, recipe })
+    let plan = Plan { scene, pyramid, encoding: options.encoding, place, recipe };
+    plan.place.expect_texts(&plan.texts()?, context.existing)?;
+    Ok(plan)
 }
 
 impl Plan {
@@ -181,14 +186,25 @@ impl Plan {
         let window = self.pyramid.size.window();
         let needed = self.memory_bytes(context);
         let (in_flight, bands) = self.scene.bands_in_flight("a pyramid", needed, context)?;
+        let texts = self.texts()?;
         self.place.begin(&self.recipe, context)?;
+        self.place.expect_texts(&texts, context.existing)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
         let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };
-        if !self.is_whole() {
+        // What the tiles do not hold is found by going through the picture, and kept for those who find them done.
+        let state = self.place.state()?.unwrap_or_default();
+        let kept = state.get(NOTES).and_then(|notes| serde_json::from_value(notes.clone()).ok());
+        let notes: Vec<String> = if let Some(notes) = kept.filter(|_| self.is_whole()) {
+            tiles.found.store(total, Ordering::Relaxed);
+            notes
+        } else {
             let mut cascade = Cascade::new(&self.pyramid, self.scene.meaning());
             let mut pixels = vec![[0.0; 3]; window.size.width];
-            let read = |rows: Range<usize>| Ok((rows.len(), self.scene.read(rows, context)?));
+            let read = |rows: Range<usize>| {
+                let band = self.scene.read(rows.clone(), context);
+                Ok((rows.len(), band.map_err(|error| self.scene.explain(error))?))
+            };
             read_ahead::for_each(context, in_flight, bands, read, |(rows, band)| {
                 (0..rows).try_for_each(|row| {
                     band.row(row, &mut pixels);
@@ -196,13 +212,10 @@ impl Plan {
                     cascade.push(&self.pyramid, &pixels, &tiles)
                 })
             })?;
-        } else {
-            tiles.found.store(total, Ordering::Relaxed);
-        }
-        self.keep_checksums()?;
-        self.place
-            .write_beside(&self.place.page, &page::viewer(&self.pyramid, self.encoding, &self.place.name)?)?;
-        self.place.write_beside(&self.place.description, &page::description(&self.pyramid, self.encoding))?;
+            self.scene.beyond().notes()
+        };
+        self.end(&notes)?;
+        texts.iter().try_for_each(|(path, text)| self.place.write_beside(path, text, context.existing))?;
         context.progress.end();
         let found = tiles.found.into_inner();
         Ok(Report {
@@ -210,15 +223,23 @@ impl Plan {
             levels: self.pyramid.top() + 1,
             tiles_found: found,
             tiles_written: total - found,
-            notes: self.scene.beyond().notes(),
+            notes: self.scene.incomplete().map(str::to_owned).into_iter().chain(notes).collect(),
         })
     }
 
-    /// Keeps the checksums of all tiles beside the recipe, by which exchanged ones are found.
-    fn keep_checksums(&self) -> Result<()> {
+    /// The viewer and the description, which comes last: it is there only once all else is.
+    fn texts(&self) -> Result<[(&Path, String); 2]> {
+        let viewer = page::viewer(&self.pyramid, self.encoding, &self.place.name)?;
+        let description = page::description(&self.pyramid, self.encoding);
+        Ok([(&self.place.page, viewer), (&self.place.description, description)])
+    }
+
+    /// Keeps beside the recipe the checksums of all tiles, by which exchanged ones are found, and what tiles do not hold.
+    fn end(&self, notes: &[String]) -> Result<()> {
         let mut state = self.place.state()?.unwrap_or_default();
         let checksums = verify::checksums(&self.pyramid, &self.place)?;
         state.insert(verify::CHECKSUMS.to_owned(), json!(checksums));
+        state.insert(NOTES.to_owned(), json!(notes));
         self.place.write_state(state)
     }
 

@@ -11,8 +11,8 @@ use serde_json::{Map, Value, json};
 use super::Encoding;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
-use crate::store::mapped::{self, MappedFile, MappedStorage, Temporary};
-use crate::store::output::{Existing, expect_outside_stores};
+use crate::store::mapped::{self, MappedStorage, Temporary};
+use crate::store::output::{Existing, expect_outside_stores, holds, settle};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::store::{FORMAT, Store, is_lock, metadata};
 
@@ -168,18 +168,37 @@ impl Place {
         })
     }
 
+    /// Refuses a page or a description that lies there and is another's, before any work.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Recipe`]; where it may be replaced, only for what is no file.
+    pub(super) fn expect_texts(&self, texts: &[(&Path, String)], existing: Existing) -> Result<()> {
+        for (path, text) in texts {
+            if path.symlink_metadata().is_err() || holds(path, text.as_bytes())? {
+                continue;
+            }
+            existing.expect_free(path).map_err(|_| {
+                let found = format!("{} exists and is not what this pyramid has there", path.display());
+                let todo = "move it away, or replace it by --force if it is a file";
+                Error::recipe(found).hint(todo)
+            })?;
+        }
+        Ok(())
+    }
+
     /// Writes a file beside the tiles' folder; its temporary one lies in the folder, where it is swept.
     /// One that says so already is left alone.
-    pub(super) fn write_beside(&self, path: &Path, text: &str) -> Result<()> {
-        if MappedFile::open(path).is_ok_and(|found| found.as_ref() == text.as_bytes()) {
+    pub(super) fn write_beside(&self, path: &Path, text: &str, existing: Existing) -> Result<()> {
+        if holds(path, text.as_bytes())? {
             return Ok(());
         }
         let name = path.file_name().unwrap_or_default();
         let written = || {
             let temporary = Temporary::file(&self.folder.join(name))?;
             temporary.handle()?.write_all(text.as_bytes())?;
-            temporary.publish(path)
+            Ok(temporary)
         };
-        written().map_err(|error| Error::io("write", path, error))
+        let temporary = written().map_err(|error| Error::io("write", path, error))?;
+        settle(temporary.path(), path, existing).map(drop)
     }
 }

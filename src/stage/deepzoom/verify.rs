@@ -261,7 +261,7 @@ fn texts(pyramid: &Pyramid, place: &Place, encoding: Encoding, report: &mut Repo
             report.find(
                 "description",
                 what,
-                "run the command that makes the pyramid again: it writes this file anew",
+                "move this file away and run the command that makes the pyramid again, which writes it anew",
             );
         }
     }

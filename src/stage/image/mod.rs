@@ -113,7 +113,9 @@ pub fn run(
     let writing = encoding.memory_bytes(size) + WRITING_BYTES;
     let (in_flight, bands) = scene.bands_in_flight("a picture", writing, context)?;
     context.progress.begin("image", size.height as u64, Counted::Items("rows"));
-    let read = |rows: Range<usize>| Ok((rows.len(), scene.read(rows, context)?));
+    let read = |rows: Range<usize>| {
+        Ok((rows.len(), scene.read(rows, context).map_err(|error| scene.explain(error))?))
+    };
     let made = read_ahead::with(context, in_flight, bands, read, |bands| {
         let mut rows = Rows { bands, band: None };
         stream::prepare(output, encoding, size, scene.meaning(), context.existing, |pixels| {
@@ -127,7 +129,7 @@ pub fn run(
         .publish()
     })?;
     context.progress.end();
-    Ok(Report { size, made, notes: scene.beyond().notes() })
+    Ok(Report { size, made, notes: scene.notes() })
 }
 
 /// The rows of a picture, out of bands.

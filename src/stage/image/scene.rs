@@ -43,6 +43,8 @@ pub struct Scene {
     /// What tells its pixels apart from those of another source.
     recipe: Value,
     beyond: Beyond,
+    /// That the store is not complete yet, though what is shown may be.
+    incomplete: Option<String>,
 }
 
 enum Source {
@@ -82,6 +84,31 @@ enum Pixels<'a> {
     Clusters { index: Vec<u16>, colors: &'a [[f32; 3]] },
     Texels { source: Vec<u32>, tile: &'a [[f32; 3]] },
     Own(Vec<[f32; 3]>),
+}
+
+impl Source {
+    /// What a store that is not complete yet lacks: views of a measurement, shards of an enlarged index.
+    fn incomplete(&self, path: &Path) -> Option<String> {
+        let (done, all, parts) = match self {
+            Self::Measurement { measurement, .. } => {
+                (measurement.views_done(), measurement.description().views.len(), "views")
+            }
+            Self::Clusters { enlarged, .. }
+            | Self::Index(enlarged)
+            | Self::Normals(enlarged)
+            | Self::Sources { enlarged, .. } => {
+                (enlarged.shards_done(), enlarged.shards().texels(), "shards")
+            }
+            Self::Tile(_) | Self::Plane { .. } => return None,
+        };
+        (done < all).then(|| {
+            let path = path.display();
+            format!(
+                "{path} is not complete, {} of {all} {parts} are missing; this shows what is there",
+                all - done
+            )
+        })
+    }
 }
 
 impl Band<'_> {
@@ -153,7 +180,30 @@ impl Scene {
         if options.values != Values::Model {
             recipe["values"] = json!("measured");
         }
-        Ok(Self { source, area, recipe, beyond: Beyond::default() })
+        let incomplete = source.incomplete(path);
+        Ok(Self { source, area, recipe, beyond: Beyond::default(), incomplete })
+    }
+
+    /// What a user should know of the picture: what display values do not hold of it, and what its store lacks.
+    pub fn notes(&self) -> Vec<String> {
+        self.incomplete.iter().cloned().chain(self.beyond.notes()).collect()
+    }
+
+    /// Says of an error that something is missing how much of the store is.
+    pub(crate) fn explain(&self, error: Error) -> Error {
+        match &self.incomplete {
+            Some(told) if error.kind() == Kind::Missing => {
+                let told = told.split("; ").next().unwrap_or_default();
+                let hint = error.guidance().unwrap_or_default().to_owned();
+                Error::missing(format!("{error}: {told}")).hint(hint)
+            }
+            _ => error,
+        }
+    }
+
+    /// That the store of the picture is not complete, where it is not.
+    pub(crate) fn incomplete(&self) -> Option<&str> {
+        self.incomplete.as_deref()
     }
 
     /// Rows and columns.
@@ -409,7 +459,13 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         "window": [area.x, area.y, area.size.width, area.size.height],
         "values": if options.values == Values::Model { "model" } else { "measured" },
     });
-    Ok(Scene { source: Source::Plane { plane, variation, tile }, area, recipe, beyond: Beyond::default() })
+    Ok(Scene {
+        source: Source::Plane { plane, variation, tile },
+        area,
+        recipe,
+        beyond: Beyond::default(),
+        incomplete: None,
+    })
 }
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {

@@ -833,6 +833,9 @@ fn less_address_space_than_it_takes_is_an_error_of_the_system_and_no_advice_to_a
     }
 }
 
+/// An exit code, why, and a command that ends with it.
+type Ending<'a> = (i32, &'a str, &'a dyn Fn() -> Option<i32>);
+
 /// The table of docs/safety.md, row by row: a command that ends with each code, and no other code is in the table.
 #[test]
 fn exit_codes_are_those_of_the_table() {
@@ -860,7 +863,7 @@ fn exit_codes_are_those_of_the_table() {
         child.wait().unwrap().code()
     };
     let code = |arguments: &[&str]| btf().args(arguments).output().unwrap().status.code();
-    let cases: &[(i32, &str, &dyn Fn() -> Option<i32>)] = &[
+    let cases: &[Ending<'_>] = &[
         (0, "done", &|| code(&["info", &measurement])),
         (0, "found done", &|| code(&["import", &archive, &measurement])),
         (1, "a limit", &|| {

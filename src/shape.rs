@@ -21,6 +21,18 @@ impl Size {
         Self { height, width }
     }
 
+    /// Reads `WIDTHxHEIGHT`, each from 1 to `most`.
+    ///
+    /// # Errors
+    /// What was expected, and what was found.
+    pub fn up_to(text: &str, most: usize) -> Result<Self, String> {
+        let expected =
+            || format!("expected WIDTHxHEIGHT such as 1024x1024, each from 1 to {most}, got {text:?}");
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
+        let side = |part: &str| part.trim().parse().ok().filter(|n| (1..=most).contains(n));
+        Ok(Self { height: side(height).ok_or_else(expected)?, width: side(width).ok_or_else(expected)? })
+    }
+
     /// Number of texels.
     pub fn texels(self) -> usize {
         self.height * self.width
@@ -48,11 +60,7 @@ impl FromStr for Size {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
-            || format!("expected WIDTHxHEIGHT such as 1024x1024, each from 1 to {MOST_SIDE}, got {text:?}");
-        let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
-        let side = |part: &str| part.trim().parse().ok().filter(|n| (1..=MOST_SIDE).contains(n));
-        Ok(Self { height: side(height).ok_or_else(expected)?, width: side(width).ok_or_else(expected)? })
+        Self::up_to(text, MOST_SIDE)
     }
 }
 
@@ -153,6 +161,7 @@ mod tests {
             assert!(text.parse::<Size>().is_err_and(|told| told.contains("from 1 to 16777216")), "{text}");
         }
         assert!("16777216x1".parse::<Size>().is_ok());
+        assert!(Size::up_to("65537x1", 65536).is_err_and(|told| told.contains("from 1 to 65536,")));
         for text in ["0,0,0,5", "0,0,5,-1", "0,0,5000000000,1", "0,0,1,99999999999999999999"] {
             assert!(text.parse::<Area>().is_err_and(|told| told.contains("from 1 to 2147483648")), "{text}");
         }

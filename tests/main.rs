@@ -42,6 +42,8 @@ mod fixture;
 #[cfg(feature = "hdf5")]
 #[path = "behaviour/hdf5.rs"]
 mod hdf5;
+#[path = "behaviour/input_words.rs"]
+mod input_words;
 #[path = "behaviour/interruption.rs"]
 mod interruption;
 #[path = "behaviour/judging.rs"]

@@ -19,7 +19,8 @@ impl Angles {
     /// Straight along the surface normal.
     pub const FRONTAL: Angles = Angles { theta_deg: 0.0, phi_deg: 0.0 };
 
-    /// Brings a direction into canonical form. `None` unless theta is in 0..=90 and phi is finite.
+    /// Brings a direction into canonical form. `None` unless theta is in 0..=90 and phi within ten turns: a larger
+    /// number is no azimuth.
     ///
     /// ```
     /// use btfkit_formats::Angles;
@@ -30,7 +31,8 @@ impl Angles {
     /// assert_eq!(Angles::new(91.0, 0.0), None);
     /// ```
     pub fn new(theta_deg: f64, phi_deg: f64) -> Option<Angles> {
-        if !(0.0..=90.0).contains(&theta_deg) || !phi_deg.is_finite() {
+        const TEN_TURNS: f64 = 3600.0;
+        if !(0.0..=90.0).contains(&theta_deg) || !(-TEN_TURNS..=TEN_TURNS).contains(&phi_deg) {
             return None;
         }
         if theta_deg == 0.0 {
@@ -114,9 +116,14 @@ mod tests {
         assert_eq!(phi(-1e-300).to_bits(), 0.0f64.to_bits());
         assert_eq!(phi(-0.0).to_bits(), 0.0f64.to_bits());
         assert_eq!(Angles::new(-0.0, 77.0), Angles::new(0.0, 0.0));
-        for (theta, phi) in
-            [(-1.0, 0.0), (90.5, 0.0), (f64::NAN, 0.0), (10.0, f64::NAN), (10.0, f64::INFINITY)]
-        {
+        for (theta, phi) in [
+            (-1.0, 0.0),
+            (90.5, 0.0),
+            (f64::NAN, 0.0),
+            (10.0, f64::NAN),
+            (10.0, f64::INFINITY),
+            (10.0, 3601.0),
+        ] {
             assert_eq!(Angles::new(theta, phi), None, "{theta} {phi}");
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::Angles;
+use crate::{Angles, six_digits};
 
 /// Missing pairs that are listed one by one; more are only counted, since a few names can lack millions.
 const MAX_LISTED: usize = 1 << 16;
@@ -40,11 +40,10 @@ pub struct Pair {
 }
 
 impl fmt::Display for Pair {
-    /// As in file names, in degrees without leading zeros, to four decimals.
+    /// As in file names, in degrees without leading zeros, to six digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shown = |degrees: f64| (degrees * 1e4).round() / 1e4;
-        let (tl, pl) = (shown(self.light.theta_deg()), shown(self.light.phi_deg()));
-        let (tv, pv) = (shown(self.view.theta_deg()), shown(self.view.phi_deg()));
+        let (tl, pl) = (six_digits(self.light.theta_deg()), six_digits(self.light.phi_deg()));
+        let (tv, pv) = (six_digits(self.view.theta_deg()), six_digits(self.view.phi_deg()));
         write!(f, "tl{tl} pl{pl} tv{tv} pv{pv}")
     }
 }
@@ -76,6 +75,8 @@ pub struct CatalogueErrors {
     pub missing_count: u64,
     /// Pairs with several images, sorted: all.
     pub duplicates: Vec<Duplicate>,
+    /// Names of images that are the only one of their light or view, where others have more: they may be misnamed.
+    pub lone: Vec<String>,
 }
 
 impl Catalogue {
@@ -141,6 +142,7 @@ impl Catalogue {
                 missing,
                 missing_count,
                 duplicates,
+                lone: lone(&found, views.len(), lights.len()),
             }));
         }
         // Complete and sorted by view, then light: the list is the grid.
@@ -235,6 +237,28 @@ fn near(a: Angles, b: Angles) -> bool {
     apart.sum::<f64>() <= SAME_RAD * SAME_RAD
 }
 
+/// Names of the images that are the only one of their light or view, where another one has more.
+fn lone(found: &[(Cell, usize, &str)], views: usize, lights: usize) -> Vec<String> {
+    let (mut of_view, mut of_light) = (vec![0u64; views], vec![0u64; lights]);
+    let add = |counts: &mut Vec<u64>, number: usize| {
+        if let Some(count) = counts.get_mut(number) {
+            *count = count.saturating_add(1);
+        }
+    };
+    for &((view, light), ..) in found {
+        add(&mut of_view, view);
+        add(&mut of_light, light);
+    }
+    let others_have_more = [&of_view, &of_light].map(|counts| counts.iter().any(|&count| count > 1));
+    let is_lone = |counts: &[u64], number: usize, side: usize| {
+        counts.get(number) == Some(&1) && others_have_more.get(side) == Some(&true)
+    };
+    let alone = found
+        .iter()
+        .filter(|((view, light), ..)| is_lone(&of_view, *view, 0) || is_lone(&of_light, *light, 1));
+    alone.map(|&(_, _, name)| name.to_owned()).collect()
+}
+
 /// The cells of the grid that are not in `present`, which is sorted and a part of the grid.
 fn gaps(views: usize, lights: usize, present: impl Iterator<Item = Cell>) -> impl Iterator<Item = Cell> {
     let grid = (0..views).flat_map(move |view| (0..lights).map(move |light| (view, light)));
@@ -271,6 +295,9 @@ impl CatalogueErrors {
         push_list(&mut text, "missing", missing, self.missing_count);
         let doubled = self.duplicates.iter().map(Duplicate::describe);
         push_list(&mut text, "more than once", doubled, count(self.duplicates.len()));
+        let lone = self.lone.iter().map(|name| format!("{name:?}"));
+        let title = "the only picture of its light or view, so perhaps misnamed";
+        push_list(&mut text, title, lone, count(self.lone.len()));
         text
     }
 }

@@ -41,23 +41,39 @@ impl Direction {
     }
 }
 
+/// An angle or another number for people: six significant digits, and none beyond the sixth decimal, where a conversion
+/// leaves its noise.
+///
+/// ```
+/// assert_eq!(btfkit_formats::six_digits(14.999999999999998).to_string(), "15");
+/// ```
+pub fn six_digits(value: f64) -> f64 {
+    let decimals = (value * 1e6).round() / 1e6;
+    // Zero is not negative.
+    format!("{decimals:.5e}").parse().unwrap_or(decimals) + 0.0
+}
+
 impl std::fmt::Display for Direction {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (theta, phi) = self.degrees();
-        write!(f, "theta {theta:.4} phi {phi:.4}")
+        write!(f, "theta {} phi {}", six_digits(theta), six_digits(phi))
     }
 }
 
 impl std::str::FromStr for Direction {
     type Err = String;
 
-    /// `theta,phi` in degrees.
+    /// `theta,phi` in degrees, phi within a turn either way.
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("expected theta,phi in degrees such as 15,0 (theta 0 to 90), got {text:?}");
+        let expected = || {
+            format!(
+                "expected theta,phi in degrees such as 15,0 (theta 0 to 90, phi -360 to 360), got {text:?}"
+            )
+        };
         let (theta, phi) = text.split_once(',').ok_or_else(expected)?;
         let angle = |part: &str| part.trim().parse::<f64>().ok().filter(|a| a.is_finite());
         let (theta, phi) = (angle(theta).ok_or_else(expected)?, angle(phi).ok_or_else(expected)?);
-        if !(0.0..=90.0).contains(&theta) {
+        if !(0.0..=90.0).contains(&theta) || !(-360.0..=360.0).contains(&phi) {
             return Err(expected());
         }
         Ok(Direction::from_degrees(theta, phi.rem_euclid(360.0)))

@@ -122,8 +122,10 @@ impl Forms {
         let angles = |side, form| {
             let get = |component| value(Field { side, component }).unwrap_or(f64::NAN);
             match form {
-                Form::Polar => Angles::new(get(Component::Theta), get(Component::Phi))
-                    .ok_or((Field { side, component: Component::Theta }, "theta in 0..=90 degrees")),
+                Form::Polar => Angles::new(get(Component::Theta), get(Component::Phi)).ok_or((
+                    Field { side, component: Component::Theta },
+                    "theta in 0..=90 degrees and phi within ten turns",
+                )),
                 Form::Vector => Angles::from_vector(VECTOR.map(get))
                     .map_err(|expected| (Field { side, component: Component::Z }, expected)),
             }
@@ -174,6 +176,37 @@ impl NumberPrefix {
     }
 }
 
+/// What the angle of a name is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unit {
+    Degrees,
+    Radians,
+    /// Gon, turns, milliradians: not read.
+    Other,
+}
+
+impl Unit {
+    /// By what follows a number: right behind it whatever begins like a unit, behind a mark only the whole word.
+    /// Degrees where there is none.
+    pub(crate) fn of(rest: &str) -> Unit {
+        const RADIANS: [&str; 3] = ["radians", "radian", "rads"];
+        const OTHERS: [&str; 9] =
+            ["mrad", "mrads", "grad", "grads", "gradians", "gon", "gons", "turn", "turns"];
+        let word = rest.strip_prefix(['_', '-', ' ']).unwrap_or(rest);
+        let end = word.find(|c: char| !c.is_alphabetic()).unwrap_or(word.len());
+        let word = word.get(..end).unwrap_or_default().to_ascii_lowercase();
+        let glued = end > 0 && rest.starts_with(char::is_alphabetic);
+        let is = |unit: &str| if glued { word.starts_with(unit) } else { word == unit };
+        if is("rad") || RADIANS.iter().any(|unit| is(unit)) {
+            Unit::Radians
+        } else if OTHERS.iter().any(|unit| is(unit)) {
+            Unit::Other
+        } else {
+            Unit::Degrees
+        }
+    }
+}
+
 /// Letters that stand for the decimal point, or before an exponent.
 const LETTERS_IN_NUMBERS: [char; 6] = ['p', 'P', 'd', 'D', 'e', 'E'];
 
@@ -182,9 +215,13 @@ const BETWEEN_NUMBERS: &str = "_- \t=+()[]{}<>#@~&%/\\";
 
 /// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by
 /// half: `7,5`, `7p5`, `7d5`, `4.5e+01`, `1.2.3`. Any mark counts that does not stand between numbers (the world has
-/// more decimal points than can be listed), and digits of any script.
+/// more decimal points than can be listed), and digits of any script. Minutes behind degrees count too: `7deg30`.
 pub(crate) fn goes_on(rest: &str) -> bool {
     let digit = |c: char| c.is_numeric();
+    let minutes = ["deg", "°"].iter().find_map(|unit| rest.strip_prefix(unit));
+    if minutes.is_some_and(|minutes| minutes.starts_with(digit)) {
+        return true;
+    }
     let mut chars = rest.chars();
     let Some(mark) = chars.next() else { return false };
     let after = chars.as_str();
@@ -276,6 +313,22 @@ mod tests {
         {
             assert!(!digits_are_left(rest), "{rest}");
         }
+    }
+
+    #[test]
+    fn units_behind_numbers() {
+        for rest in ["rad", "RAD_", "rad.png", "radpl5", "radians", "_rad", " rad_", "-radian.5", "_rads"] {
+            assert_eq!(Unit::of(rest), Unit::Radians, "{rest}");
+        }
+        for rest in ["grad", "Gon_pl5", "_gon", "gradpl", "mrad_", " turns", "_grads"] {
+            assert_eq!(Unit::of(rest), Unit::Other, "{rest}");
+        }
+        for rest in
+            ["", "deg", "°", "_", "_pl5", "pl5", ".png", "_radial", "_gradient", "_gone", "5rad", "_x_rad"]
+        {
+            assert_eq!(Unit::of(rest), Unit::Degrees, "{rest}");
+        }
+        assert!(goes_on("deg30") && goes_on("°30") && !goes_on("deg_30"));
     }
 
     #[test]

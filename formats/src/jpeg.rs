@@ -3,11 +3,13 @@
 //! Decoders are built to show what they can of a damaged picture; a measurement wants the opposite. So a
 //! file is walked marker by marker first and refused unless it ends with an EOI marker, every coefficient of
 //! every component was sent to full precision, restart markers are all there, and its scans have enough
-//! bytes for the size that the header claims. Only then are pixels decoded, in the decoder's strict mode, and an end
-//! of the data before that of the picture is found there.
+//! bytes for the size that the header claims. Only then are pixels decoded, in the decoder's strict mode, and there it
+//! is found where data end too early (before a restart marker, a further scan, the end of the picture), and where more
+//! than 16 bytes of them are left at the end, as those of rows that the header does not claim.
 //!
-//! What this cannot see: bytes changed or left out inside a scan that still decode, and rows that the header does not
-//! claim. A zip's CRC-32 does.
+//! What this cannot see: bytes changed or left out inside a scan that still decode, what is missing at the very end of
+//! a progressive picture's first scan, and data that are left over in an interval that is not the last. A zip's CRC-32
+//! does.
 
 mod decode;
 mod encode;
@@ -18,6 +20,7 @@ mod marker;
 pub(crate) mod profile;
 mod progress;
 mod structure;
+mod watched;
 
 pub use decode::{Image, decode};
 pub use encode::{Chroma, EncodeOptions, encode};

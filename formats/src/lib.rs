@@ -78,7 +78,7 @@ pub mod zip;
 pub use angles::Angles;
 pub use catalogue::{Catalogue, CatalogueErrors, Duplicate, Pair};
 pub use contents::{Contents, Images};
-pub use direction::Direction;
+pub use direction::{Direction, six_digits};
 pub use error::{Error, ErrorKind, Result};
 pub use limits::Limits;
 pub use samples::{SampleType, Samples, f16};

@@ -92,10 +92,10 @@ pub struct PictureHeader {
     /// stored and what is meant where it says nothing. Samples are handed out as stored.
     pub orientation: u8,
     /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an
-    /// ICC profile, a gamma, code points (JPEG, PNG, TIFF).
+    /// ICC profile, a gamma, code points, primaries, levels of black and white.
     pub profile: Option<String>,
-    /// The one layer of an OpenEXR picture whose channels are all in it.
-    pub layer: Option<String>,
+    /// What of an OpenEXR picture is read and what is not (layer, channels, window), a sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// How a Radiance picture is read whose resolution line is `+X n -Y n`.
@@ -220,7 +220,7 @@ fn of_jpeg(header: jpeg::Header, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: header.orientation,
         profile: jpeg::profile::profile(bytes),
-        layer: None,
+        remarks: Vec::new(),
     }
 }
 

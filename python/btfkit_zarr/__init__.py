@@ -1,7 +1,7 @@
 """The Zarr codec `btfkit.predictive`: `import btfkit_zarr`, and zarr-python reads and writes it.
 
 Installed (`pip install ./python`), zarr-python finds it without the import. The bytes are described in
-`docs/codec.md`.
+`docs/reference/codec.md`.
 """
 
 import asyncio

@@ -1,4 +1,4 @@
-"""The prediction of `docs/codec.md`, on arrays of unsigned integers; all arithmetic is modulo 2^bits."""
+"""The prediction of `docs/reference/codec.md`, on arrays of unsigned integers; all arithmetic is modulo 2^bits."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The coherent rule by numpy alone, written from docs/coherent.md: any window of the plane, any seed.
+"""The coherent rule by numpy alone, written from docs/method/coherent.md: any window of the plane, any seed.
 
 Positions are held as two arrays (rows, columns) over a window of places; a window is (first row, last row + 1, first
 column, last column + 1) of a level.

@@ -1,6 +1,6 @@
 """Examples of the coherent rule: a frozen exemplar and windows that must come out.
 
-    python -m judge.example FILE            checks docs/coherent/example.json, or another, by numpy
+    python -m judge.example FILE            checks docs/method/coherent-example.json, or another, by numpy
     python -m judge.example --make FOLDER   writes examples at random, of awkward sizes too, for the program's tests
 
 Run within scripts/.

@@ -1,4 +1,4 @@
-"""The coherent rule by numba, written from docs/coherent.md: one JSON object, CPU nanoseconds for a texel.
+"""The coherent rule by numba, written from docs/method/coherent.md: one JSON object, CPU nanoseconds for a texel.
 
     coherent.py MODEL ENLARGED [SIDE]
 

@@ -105,11 +105,11 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
     if let Some(&beyond) = adaptation.drop_views.iter().find(|&&view| view >= views.len()) {
         let found =
             format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
-        return Err(Error::input(found));
+        return Err(Error::usage(found));
     }
     let kept: Vec<usize> = (0..views.len()).filter(|view| !adaptation.drop_views.contains(view)).collect();
     if kept.is_empty() {
-        return Err(Error::input(format!("{}: no view is left", inner.path().display())));
+        return Err(Error::usage(format!("{}: no view is left", inner.path().display())));
     }
     let turn = f64::from(adaptation.turn_deg).to_radians();
     let turned = |direction: &Direction, mirrored: bool| {
@@ -163,6 +163,10 @@ impl Source for Adapted {
 
     fn lights_at_once(&self) -> usize {
         if self.swap { 1 } else { self.inner.lights_at_once() }
+    }
+
+    fn bytes_beside_image(&self) -> u64 {
+        self.inner.bytes_beside_image()
     }
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {

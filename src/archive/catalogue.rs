@@ -51,7 +51,11 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         return Ok(Found { catalogue, format: "pictures with a table".to_owned(), assumptions });
     }
     if let Some(text) = &options.pattern {
-        let pattern = Pattern::parse(text)?;
+        let pattern = Pattern::parse(text).map_err(|error| {
+            Error::usage(format!("--pattern {text:?}: {error}"))
+                .hint("docs/formats/folders.md says how patterns are written")
+        })?;
+        require_fit(&pattern, files).map_err(|error| error.context(archive.display()))?;
         return by_pattern(&pattern, files, complete);
     }
     let lists: Vec<usize> = match files.named_list() {
@@ -100,6 +104,19 @@ fn without_counter(name: &str) -> Option<String> {
     let head = before.strip_suffix(['_', '-', ' ']).filter(|_| before.len() < stem.len())?;
     let pattern = named::recognise([format!("{head}.{ending}").as_str()]).ok()?;
     Some(format!("{pattern}{}{{n}}", &before[head.len()..]))
+}
+
+/// That a pattern which the user gives fits any picture.
+fn require_fit(pattern: &Pattern, files: &Files) -> Result<()> {
+    let Some(first) = files.names().find(|name| is_picture(name)) else { return Ok(()) };
+    if files.names().any(|name| pattern.angles(name).is_some()) {
+        return Ok(());
+    }
+    let found = format!("no name fits the pattern {:?}; the first picture is {first:?}", pattern.to_string());
+    Err(Error::input(found).hint(
+        "numbers take all digits, theta is 0 to 90 degrees ({theta_i:rad} for radians), {*} stands for any text and \
+         {n} for digits that do not matter",
+    ))
 }
 
 fn by_pattern(

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit_formats::Limits;
 use btfkit_formats::picture;
-use btfkit_formats::zip::ZipIndex;
+use btfkit_formats::zip::{Method, ZipIndex};
 
 use crate::error::{Error, Result};
 use crate::store::mapped::{self, MappedFile};
@@ -225,6 +225,19 @@ impl Files {
                 let bytes = index.read(file.as_ref(), entry);
                 bytes.map_err(|error| Error::from(error).context(path.display()))
             }
+        }
+    }
+
+    /// Bytes that are in memory while a file is decoded: its own, compressed and not, and those of a copy that a decoder
+    /// may make.
+    pub(super) fn bytes_in_use(&self, number: usize) -> u64 {
+        match &self.entries[number].place {
+            Place::Plain(path) => fs::metadata(path).map_or(0, |data| data.len().saturating_mul(2)),
+            &Place::Zipped { zip, entry } => self.zips[zip].index.entries().get(entry).map_or(0, |listed| {
+                let compressed = listed.compressed_range().len() as u64;
+                let copies = if listed.method() == Method::Stored { 1 } else { 2 };
+                listed.uncompressed_bytes().saturating_mul(copies).saturating_add(compressed)
+            }),
         }
     }
 

@@ -49,6 +49,11 @@ pub trait Source: Send + Sync {
     /// How many images of a view are best read at once.
     fn lights_at_once(&self) -> usize;
 
+    /// Bytes that reading an image takes beside its samples, at most: those of its file, mapped ones too.
+    fn bytes_beside_image(&self) -> u64 {
+        0
+    }
+
     /// The images of one view under a range of lights, [light, y, x, channel].
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples>;
 

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use btfkit_formats::picture::{self, DecodeOptions, PictureHeader};
 use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
-use rayon::prelude::*;
 
 use super::catalogue::{self, Found};
 use super::files::Files;
 use super::{Options, Source};
 use crate::error::{Error, Kind, Result};
+use crate::run::units::each_at_once;
 use crate::run::{Context, recipe};
 
 /// Problems that an error names one by one.
@@ -29,6 +29,10 @@ pub(super) struct Pictures {
     orientation: u8,
     /// What the first picture says of its colours; nothing of it is applied.
     profile: Option<String>,
+    /// What of the first picture is read and what is not.
+    remarks: Vec<String>,
+    /// What the largest picture takes while it is decoded.
+    bytes_in_use: u64,
     decoding: DecodeOptions,
     limits: Limits,
 }
@@ -47,6 +51,7 @@ impl Pictures {
         let first = images.first().copied().ok_or_else(|| Error::input("no images"))?;
         let header = picture::header(&files.bytes(first)?, &limits)
             .map_err(|error| Error::from(error.in_entry(files.name(first))).context(path.display()))?;
+        files.release(first);
         if !header.linear {
             assumptions.push("the pictures' transfer curve is sRGB".to_owned());
         }
@@ -65,9 +70,7 @@ impl Pictures {
                 header.orientation
             ));
         }
-        if let Some(layer) = &header.layer {
-            assumptions.push(format!("the layer {layer:?}, the only one, is the picture"));
-        }
+        assumptions.extend(header.remarks.iter().cloned());
         let contents = Contents {
             format,
             width: header.width,
@@ -82,9 +85,22 @@ impl Pictures {
             remarks: Vec::new(),
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
+        let bytes_in_use = images.iter().map(|&file| files.bytes_in_use(file)).max().unwrap_or(0);
         let notes = notes_of(&files, &images, catalogue.ignored() + files.hidden());
-        let PictureHeader { orientation, profile, .. } = header;
-        Ok(Self { path, files, images, notes, contents, orientation, profile, decoding, limits })
+        let PictureHeader { orientation, profile, remarks, .. } = header;
+        Ok(Self {
+            path,
+            files,
+            images,
+            notes,
+            contents,
+            orientation,
+            profile,
+            remarks,
+            bytes_in_use,
+            decoding,
+            limits,
+        })
     }
 
     fn file(&self, view: usize, light: usize) -> usize {
@@ -116,6 +132,18 @@ impl Pictures {
                 self.files.name(file),
                 told(&found.profile),
                 told(&self.profile)
+            )));
+        }
+        if found.remarks != self.remarks {
+            let told = |remarks: &[String]| match remarks {
+                [] => "the whole file is the picture".to_owned(),
+                list => list.join("; "),
+            };
+            return Err(Error::input(format!(
+                "{}: got {}, expected, like the first image, {}",
+                self.files.name(file),
+                told(&found.remarks),
+                told(&self.remarks)
             )));
         }
         Ok(checksum)
@@ -160,6 +188,10 @@ impl Source for Pictures {
         1
     }
 
+    fn bytes_beside_image(&self) -> u64 {
+        self.bytes_in_use
+    }
+
     fn notes(&self) -> Vec<String> {
         self.notes.clone()
     }
@@ -184,16 +216,15 @@ impl Source for Pictures {
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
+        let largest = self.bytes_in_use;
+        context.require(&format!("checking pictures of up to {} MiB", largest.div_ceil(1 << 20)), largest)?;
         let checked: Vec<Result<u32>> = context.install(|| {
-            self.images
-                .par_iter()
-                .map(|&file| {
-                    context.check_stop()?;
-                    let checksum = self.check_image(file);
-                    self.files.release(file);
-                    checksum
-                })
-                .collect()
+            each_at_once(&self.images, largest, context, |&file| {
+                context.check_stop()?;
+                let checksum = self.check_image(file);
+                self.files.release(file);
+                checksum
+            })
         });
         context.check_stop()?;
         let problems: Vec<String> =

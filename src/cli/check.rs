@@ -9,6 +9,7 @@ use btfkit::stage::check::{self, Finding, Report, State, Statistics};
 use btfkit::stage::import;
 use btfkit::store::measurement::Measurement;
 use clap::Args;
+use serde_json::Value;
 
 use super::each::{Ended, Line, Outcome, each};
 use super::source::SourceArgs;
@@ -23,7 +24,7 @@ Examples:
   btf check UBO_WOOD256.zip --picture wood.png
   btf check felt.btf --azimuth mirrored             does that repair it?
   btf check archives/*                              a line each, and a count
-Exits with 65 if there is a fault. docs/check.md explains every check.")]
+Exits with 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
     /// Measurements and archives; of several each has a line
     #[arg(required = true, value_name = "PATH")]
@@ -52,11 +53,12 @@ impl Check {
             let name = |path: &PathBuf| path.display().to_string();
             return each(&self.paths, name, self.json, context, tell, |path| self.one_of_many(path, context));
         }
-        let (statistics, report) = self.report(&self.paths, context)?;
+        let Examined { statistics, report, notes } = self.examine(&self.paths, context)?;
         if self.json {
-            tell.plan(&as_json(&report)?)?;
+            tell.plan(&with_notes(&report, &notes)?)?;
         } else {
             tell_report(&report, tell);
+            tell.notes(&notes);
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
@@ -66,7 +68,7 @@ impl Check {
     }
 
     /// Examines one input, which may lie in pieces.
-    fn report(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<(Statistics, Report)> {
+    fn examine(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Examined> {
         let path = first(paths);
         if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
             let measurement = open(path)?;
@@ -75,27 +77,45 @@ impl Check {
             let attributes = measurement.attributes()?;
             let reading = attributes.get("recipe").and_then(|recipe| recipe.get("reading")).cloned();
             report.beside(&serde_json::from_value(reading.unwrap_or_default()).unwrap_or_default());
-            return Ok((statistics, report));
+            return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;
         let description = import::describe(source.as_ref(), 1.0);
         let (statistics, mut report) = check::run(&ArchiveViews::new(source.as_ref(), description), context)?;
         report.beside(&source.reading().adaptation);
-        Ok((statistics, report))
+        Ok(Examined { statistics, report, notes: btfkit::archive::notes(source.as_ref()) })
     }
 
     fn one_of_many(&self, path: &PathBuf, context: &Context<'_>) -> Result<Outcome> {
-        let (_, report) = self.report(std::slice::from_ref(path), context)?;
+        let Examined { report, notes, .. } = self.examine(std::slice::from_ref(path), context)?;
         let suspected: Vec<&str> = report.findings().map(|finding| finding.code).collect();
         let line = if self.json {
-            Line::Json(as_json(&report)?)
-        } else if suspected.is_empty() {
-            Line::Text("nothing found".to_owned())
+            Line::Json(with_notes(&report, &notes)?)
         } else {
-            Line::Text(format!("no fault; noted: {}", suspected.join(", ")))
+            let found = match suspected.as_slice() {
+                [] => "nothing found".to_owned(),
+                list => format!("no fault; noted: {}", list.join(", ")),
+            };
+            Line::Text(std::iter::once(found).chain(notes).collect::<Vec<_>>().join("; note: "))
         };
         Ok((line, faults(path, &report)))
     }
+}
+
+/// What was found out about an input, and what its archive says of itself that a user should know.
+struct Examined {
+    statistics: Statistics,
+    report: Report,
+    notes: Vec<String>,
+}
+
+/// A report with the notes beside it.
+fn with_notes(report: &Report, notes: &[String]) -> Result<Value> {
+    let mut value = as_json(report)?;
+    if let Some(map) = value.as_object_mut() {
+        map.insert("notes".to_owned(), notes.into());
+    }
+    Ok(value)
 }
 
 fn first(paths: &[PathBuf]) -> &Path {
@@ -107,7 +127,7 @@ fn faults(path: &Path, report: &Report) -> Option<Error> {
     let faults: Vec<&str> = report.faults().map(|fault| fault.code).collect();
     let error =
         (!faults.is_empty()).then(|| Error::input(format!("{}: {}", path.display(), faults.join(", "))))?;
-    Some(error.hint("docs/check.md tells how each is recognised and what to do"))
+    Some(error.hint("docs/how-to/check.md says what each means and what to do about it"))
 }
 
 /// A measurement that is complete.

@@ -22,7 +22,7 @@ Examples:
   btf judge wood-4k.zarr --against wood.zarr --sheet judged.png --json judged.json
   btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless plane, not stored
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
-J is the worst of five measures; 1 is as good as another real crop. docs/judging.md tells what each measure sees.")]
+J is the worst of five measures; 1 is as good as another real crop. docs/how-to/judge.md says what each measure sees.")]
 pub(super) struct Judge {
     /// An enlarged index, or a model with --size
     subject: PathBuf,

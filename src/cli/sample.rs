@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use btfkit::error::Result;
 use btfkit::run::Context;
-use btfkit::sample::Kind;
+use btfkit::sample::{Kind, MOST_SIDE};
 use btfkit::shape::Size;
 use btfkit::stage::sample;
 use btfkit::words::counted;
@@ -24,7 +24,7 @@ pub(super) struct Sample {
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
     /// Size of its images, WIDTHxHEIGHT, each from 1 to 65536
-    #[arg(long, default_value = "128x128", allow_hyphen_values = true)]
+    #[arg(long, default_value = "128x128", allow_hyphen_values = true, value_parser = size)]
     size: Size,
     /// Number of views; 81 are those of UBO2003
     #[arg(long, default_value_t = 81)]
@@ -38,6 +38,10 @@ pub(super) struct Sample {
     /// Size of its features relative to the default
     #[arg(long, default_value_t = 1.0, value_parser = number::scale)]
     scale: f64,
+}
+
+fn size(text: &str) -> std::result::Result<Size, String> {
+    Size::up_to(text, MOST_SIDE)
 }
 
 /// A material that can be made.

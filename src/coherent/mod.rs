@@ -4,7 +4,7 @@
 //! After Lefebvre and Hoppe, "Parallel controllable texture synthesis" (2005) and "Appearance-space texture synthesis"
 //! (2006), carried over to clusters of BRDFs. Everything after the fit is made of whole numbers, and nothing is
 //! scanned: a texel is a pure function of the appearance, the seed and its place, so any window of an endless plane
-//! comes out alone. `docs/coherent.md` is the specification, which readers in other languages share.
+//! comes out alone. `docs/method/coherent.md` is the specification, which readers in other languages share.
 //!
 //! [`fit`] makes an [`Appearance`] from clusters; [`Plane`] evaluates it.
 

@@ -6,7 +6,7 @@
 //! [`Judge`] puts them in units of how far real crops of the material are from each other.
 //!
 //! What those five do not see is measured apart: repetition ([`autocorrelation`], [`repetition`]), pieces copied whole
-//! ([`copies`]) and lost clusters ([`verdict`]). `docs/judging.md` tells what each is good for.
+//! ([`copies`]) and lost clusters ([`verdict`]). `docs/how-to/judge.md` says what each is good for.
 
 pub mod autocorrelation;
 pub mod bands;

@@ -65,6 +65,14 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
             .iter()
             .find_map(|key| first_difference(&entry(old, key), &entry(new, key), &format!("{place}{key} ")));
     }
+    // Of long lists, of directions say, the first entry that differs.
+    if let (Value::Array(old), Value::Array(new)) = (old, new)
+        && old.len() == new.len()
+        && old.len() > SHORT_LIST
+    {
+        let mut pairs = old.iter().zip(new).enumerate();
+        return pairs.find_map(|(at, (old, new))| first_difference(old, new, &format!("{place}{at} ")));
+    }
     let place = place.trim_end();
     (old != new).then(|| match (old.as_str(), new.as_str()) {
         // Of what was made before only the digest is known.
@@ -73,13 +81,35 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
             shortened(old),
             shortened(new)
         ),
-        _ => format!("{place} was {}, now {}", shown(old), shown(new)),
+        _ => {
+            let (short_old, short_new) = (short(old), short(new));
+            let [old, new] = if short_old == short_new { [old, new] } else { [&short_old, &short_new] };
+            format!("{place} was {}, now {}", shown(old), shown(new))
+        }
     })
+}
+
+/// Entries of a list that is told whole.
+const SHORT_LIST: usize = 4;
+
+/// The same with fractions of six digits.
+fn short(value: &Value) -> Value {
+    match value {
+        Value::Array(values) => values.iter().map(short).collect(),
+        Value::Number(number) if number.is_f64() => {
+            number.as_f64().map_or(Value::Null, |number| btfkit_formats::six_digits(number).into())
+        }
+        other => other.clone(),
+    }
 }
 
 /// A setting; one that is null was left to the program.
 fn shown(value: &Value) -> String {
-    if value.is_null() { "not given".to_owned() } else { value.to_string() }
+    match value {
+        Value::Null => "not given".to_owned(),
+        Value::Array(list) if list.len() > SHORT_LIST => format!("a list of {}", list.len()),
+        other => other.to_string(),
+    }
 }
 
 /// A digest as messages show it.
@@ -109,5 +139,19 @@ mod tests {
         let attributes = json!({"recipe": {"clusters": 64, "seed": 1}, "digest": digest(&json!({"clusters": 64, "seed": 1}))});
         let error = expect_same(Path::new("m"), attributes.as_object().unwrap(), &recipe).unwrap_err();
         assert!(error.to_string().contains("clusters was 64, now 256"), "{error}");
+    }
+
+    #[test]
+    fn differences_are_told_by_the_entry_and_without_noise() {
+        let views =
+            |last: f64| json!({"views": [[0.0, 0.0], [15.0, 0.0], [15.0, 9.0], [30.0, 0.0], [last, 0.5]]});
+        let told = |old: &Value, new: &Value| first_difference(old, new, "").unwrap();
+        assert_eq!(told(&views(14.999999999999998), &views(30.1)), "views 4 was [15.0,0.5], now [30.1,0.5]");
+        assert_eq!(
+            told(&views(14.999999999999998), &views(15.0)),
+            "views 4 was [14.999999999999998,0.5], now [15.0,0.5]"
+        );
+        let few = json!({"views": [[0.0, 0.0]]});
+        assert_eq!(told(&few, &views(1.0)), "views was [[0.0,0.0]], now a list of 5");
     }
 }

@@ -3,6 +3,8 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use rayon::prelude::*;
+
 use crate::error::Result;
 use crate::run::{Context, spawn};
 
@@ -15,6 +17,22 @@ pub fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<u
     context.require(what, unit_bytes)?;
     let affordable = context.work_bytes() / unit_bytes.max(1);
     Ok((context.threads.max(1) as u64).min(affordable).max(1) as usize)
+}
+
+/// Works on every item on the threads of the pool that this is called in, on fewer of them where half the memory does
+/// not hold an item of `bytes` for each: results take the other half. They are in the order of the items.
+pub fn each_at_once<U: Sync, T: Send>(
+    items: &[U],
+    bytes: u64,
+    context: &Context<'_>,
+    work: impl Fn(&U) -> T + Sync,
+) -> Vec<T> {
+    let affordable = (context.work_bytes() / 2 / bytes.max(1)).max(1);
+    let together = match context.threads as u64 > affordable {
+        true => items.len().div_ceil(affordable as usize).max(1),
+        false => 1,
+    };
+    items.par_chunks(together).flat_map_iter(|chunk| chunk.iter().map(&work)).collect()
 }
 
 /// Runs `work` on every unit, at most `in_flight` at a time, in the order given.

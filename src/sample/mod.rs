@@ -19,7 +19,7 @@ mod visibility;
 mod wood;
 
 pub use shading::{Scene, ViewPoints};
-pub use surface::Surface;
+pub use surface::{MOST_SIDE, Surface};
 
 /// The materials that can be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

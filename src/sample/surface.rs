@@ -67,6 +67,9 @@ pub struct Surface {
 /// Tangent of the steepest direction (75.3 degrees) for which the margin suffices.
 const STEEPEST: f64 = 3.81;
 
+/// Longest side of a surface, texels.
+pub const MOST_SIDE: usize = 1 << 16;
+
 impl Surface {
     /// A surface of `width` x `height` texels. `scale` (0.25 to 8) multiplies the size of all
     /// features, heights with them; at 1 a cell of leather is about 14 texels across, a growth
@@ -76,9 +79,9 @@ impl Surface {
     /// # Errors
     /// A size that is zero or above 65536, or a scale out of its range.
     pub fn new(kind: Kind, width: usize, height: usize, scale: f64, seed: u64) -> Result<Self> {
-        if !(1..=1 << 16).contains(&width) || !(1..=1 << 16).contains(&height) {
+        if !(1..=MOST_SIDE).contains(&width) || !(1..=MOST_SIDE).contains(&height) {
             return Err(Error::usage(format!(
-                "a surface of {width}x{height} texels; each side may be 1 to 65536"
+                "a surface of {width}x{height} texels; each side may be 1 to {MOST_SIDE}"
             )));
         }
         if !(0.25..=8.0).contains(&scale) {

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::{Direction, Samples};
-use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -12,6 +11,7 @@ use crate::color::{Remarkable, Transfer};
 use crate::error::{Error, Kind, Result};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
+use crate::run::units::each_at_once;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::store::codec::Chain;
@@ -156,11 +156,12 @@ impl Plan<'_> {
         (0..self.description.views.len()).filter(|&view| self.options.shard.has(view))
     }
 
-    /// Memory of one view in flight: its images, and both shards twice, as chunks and put together.
+    /// Memory of one view in flight: its images, and both shards twice, as chunks and put together; and a file that is
+    /// being decoded.
     fn unit_bytes(&self) -> u64 {
         let view = self.description.view_bytes();
         let codes = (self.description.size.texels() * self.description.lights.len()) as u64;
-        3 * view + 2 * codes
+        3 * view + 2 * codes + self.source.bytes_beside_image()
     }
 
     /// Imports the views that are not in the store yet.
@@ -233,15 +234,12 @@ pub(crate) fn read_view(
     let lights = source.contents().lights.len();
     let step = source.lights_at_once().clamp(1, lights);
     let groups: Vec<_> = (0..lights).step_by(step).map(|first| first..(first + step).min(lights)).collect();
-    let read: Vec<_> = groups
-        .into_par_iter()
-        .map(|group| {
-            context.check_stop()?;
-            let samples = source.read_counted(view, group.clone(), white);
-            context.progress.advance(group.len() as u64);
-            samples.map(|samples| (group, samples))
-        })
-        .collect();
+    let read = each_at_once(&groups, source.bytes_beside_image(), context, |group| {
+        context.check_stop()?;
+        let samples = source.read_counted(view, group.clone(), white);
+        context.progress.advance(group.len() as u64);
+        samples.map(|samples| (group.clone(), samples))
+    });
     context.check_stop()?;
     let mut problems = Vec::new();
     let mut images = Vec::new();

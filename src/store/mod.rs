@@ -1,4 +1,4 @@
-//! What lies on disk: Zarr v3 groups of arrays with attributes of ours (see `docs/design.md`, section 3).
+//! What lies on disk: Zarr v3 groups of arrays with attributes of ours (see `docs/reference/stores.md`).
 //!
 //! [`Store`] is a group with its arrays; [`measurement`], [`model`] and [`enlarged`] say which arrays.
 

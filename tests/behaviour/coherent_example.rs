@@ -1,4 +1,4 @@
-//! The example of the specification, docs/coherent/example.json: what a frozen exemplar must give, whatever bases later
+//! The example of the specification, docs/method/coherent-example.json: what a frozen exemplar must give, whatever bases later
 //! versions fit. scripts/judge/example.py checks the same file by numpy, and makes others at random that are checked here.
 
 use std::fmt::Write as _;
@@ -107,7 +107,7 @@ impl Example {
 }
 
 fn file() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/coherent/example.json")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/method/coherent-example.json")
 }
 
 #[test]
@@ -132,7 +132,7 @@ fn examples_of_others_come_out() {
 
 /// Makes the file anew. What it holds is frozen: to be run only where the rule itself changes.
 #[test]
-#[ignore = "writes docs/coherent/example.json"]
+#[ignore = "writes docs/method/coherent-example.json"]
 fn write_the_example() {
     let (height, width, clusters) = (24, 20, 12);
     let draw = |seed: u32, y: usize, x: usize| {

@@ -1,16 +1,17 @@
 //! Samples of a JPEG.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::errors::DecodeErrors;
-use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;
 use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::frame::Arrangement;
 use super::interleave::interleaved;
 use super::structure::{self, Walked};
+use super::watched::{Marked, Watched};
 use crate::{Error, Limits, Result};
 
 /// A decoded image.
@@ -38,26 +39,22 @@ pub struct Image {
 /// - [`ErrorKind::Limit`](crate::ErrorKind::Limit): more pixels or scans than `limits` allows.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     let walked = structure::walk(bytes, limits)?;
-    let picture = with_colours(bytes.get(..walked.length).unwrap_or(bytes), &walked);
+    let plain = bytes.get(..walked.length).unwrap_or(bytes);
+    let picture = with_colours(plain, &walked);
     let picture = picture.as_ref();
     let header = walked.header;
-    let bytes = match walked.arrangement {
-        Arrangement::Ordinary => ended_by_no_code(picture),
-        Arrangement::OneComponent(at) => {
-            let mut plain = ended_by_no_code(picture);
-            if let Some(factors) = plain.get_mut(at) {
-                *factors = 0x11;
-            }
-            plain
-        }
+    let marked = || Marked::new(picture, &walked, picture.len().saturating_sub(plain.len()));
+    let data = match &walked.arrangement {
+        Arrangement::Ordinary => marked(),
+        Arrangement::OneComponent(at) => marked().with(*at, 0x11),
         // Read to the last bit as its scans are put together.
-        Arrangement::ScatteredScans(mut grid) => {
-            if let Some((id, _)) =
-                grid.components.first_mut().filter(|_| !walked.rgb && !walked.red_ids.is_empty())
-            {
+        Arrangement::ScatteredScans(grid) => {
+            let mut grid = grid.clone();
+            let is_red = !walked.rgb && !walked.red_ids.is_empty();
+            if let Some((id, _)) = grid.components.first_mut().filter(|_| is_red) {
                 *id = NO_RED;
             }
-            interleaved(picture, &grid)?
+            Marked::exact(interleaved(picture, &grid)?)
         }
     };
     let colours = if header.channels == 1 { ColorSpace::Luma } else { ColorSpace::RGB };
@@ -67,8 +64,10 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         .set_max_height(usize::from(u16::MAX))
         .jpeg_set_max_scans(usize::try_from(limits.max_scans_per_image).unwrap_or(usize::MAX))
         .jpeg_set_out_colorspace(colours);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes.as_slice()), options);
+    let refilled = Cell::new(0);
+    let mut decoder = JpegDecoder::new_with_options(Watched::new(&data.bytes, &refilled), options);
     let samples = decoder.decode().map_err(|e| undecodable(&e))?;
+    data.require_all_read(refilled.get())?;
 
     let pixels = u64::from(header.width).saturating_mul(u64::from(header.height));
     let expected = pixels.saturating_mul(u64::from(header.channels));
@@ -79,17 +78,6 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
         ));
     }
     Ok(Image { width: header.width, height: header.height, channels: header.channels, samples })
-}
-
-/// Data of bits that are all set, which is never a code of a Huffman table (T.81, annex C); as many as a decoder reads
-/// before it looks for a code.
-const NO_CODE: [[u8; 2]; 16] = [[0xFF, 0]; 16];
-
-/// The picture with [`NO_CODE`] before the marker that ends it. Where data are missing, the decoder would go on with
-/// zeros, which are the codes of something; now it finds that there is no code.
-fn ended_by_no_code(picture: &[u8]) -> Vec<u8> {
-    let (scans, end) = picture.split_at(picture.len().saturating_sub(2));
-    [scans, NO_CODE.as_flattened(), end].concat()
 }
 
 /// An Adobe segment that says of three components that they are red, green and blue.

@@ -32,7 +32,7 @@ impl Component {
 }
 
 /// Components and coded units of a frame.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Grid {
     pub(super) width: u16,
     pub(super) height: u16,
@@ -179,8 +179,9 @@ impl Frame {
         })
     }
 
-    /// Reads a scan header and steps over the scan's data. `restart_interval` counts coded units; 0 is none.
-    pub(super) fn read_scan(&mut self, reader: &mut Reader<'_>, restart_interval: u64) -> Result<()> {
+    /// Reads a scan header and steps over the scan's data; returns where each interval of them ends.
+    /// `restart_interval` counts coded units; 0 is none.
+    pub(super) fn read_scan(&mut self, reader: &mut Reader<'_>, restart_interval: u64) -> Result<Vec<usize>> {
         let at = reader.position();
         let relative = |e: Error| e.at(at);
         let mut fields = Reader::new(segment(reader)?);
@@ -245,7 +246,7 @@ impl Frame {
             )
             .at(data_at));
         }
-        Ok(())
+        Ok(data.ends)
     }
 
     fn require_legal_band(&self, selected: &[usize], band: Band) -> Result<()> {

@@ -55,6 +55,8 @@ pub(super) struct EntropyCoded {
     pub(super) bytes: u64,
     /// Restart markers.
     pub(super) restarts: u64,
+    /// Where every marker stands that ends data: the restart markers, then the one after the scan.
+    pub(super) ends: Vec<usize>,
 }
 
 /// Steps over a scan's data, to its end at the next marker that is no restart marker.
@@ -63,6 +65,7 @@ pub(super) fn entropy_coded(reader: &mut Reader<'_>) -> Result<EntropyCoded> {
     let cut = || Error::malformed("the end of the data inside a scan", "an EOI marker").at(start);
     let scan = reader.rest();
     let (mut stuffed, mut restarts) = (0u64, 0u64);
+    let mut ends = Vec::new();
     for at in memchr::memchr_iter(0xFF, scan) {
         // Each 0xFF but a marker's own is followed by a byte that is none, so no pair is seen twice.
         match scan.get(at.saturating_add(1)) {
@@ -75,12 +78,14 @@ pub(super) fn entropy_coded(reader: &mut Reader<'_>) -> Result<EntropyCoded> {
                     return Err(Error::malformed(format!("RST{}", code & 7), expected).at(position));
                 }
                 restarts = restarts.saturating_add(1);
+                ends.push(start.saturating_add(at));
             }
             Some(_) => {
                 reader.take(at)?;
+                ends.push(start.saturating_add(at));
                 let all = u64::try_from(at).unwrap_or(u64::MAX);
                 let bytes = all.saturating_sub(stuffed).saturating_sub(restarts.saturating_mul(2));
-                return Ok(EntropyCoded { bytes, restarts });
+                return Ok(EntropyCoded { bytes, restarts, ends });
             }
             None => return Err(cut()),
         }

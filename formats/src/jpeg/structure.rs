@@ -17,6 +17,8 @@ pub(super) struct Walked {
     pub(super) adobe: Vec<usize>,
     /// Three components that are red, green and blue and not YCbCr, as libjpeg and all that is built on it have it.
     pub(super) rgb: bool,
+    /// Where the marker stands behind each interval of data, of all scans.
+    pub(super) data_ends: Vec<usize>,
     /// Where the id R of the first component stands, in the frame header and in those of scans.
     pub(super) red_ids: Vec<usize>,
 }
@@ -52,7 +54,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut scans = 0u32;
     let mut orientation = 1;
     let (mut is_jfif, mut adobe, mut transform) = (false, Vec::new(), None);
-    let mut red_ids = Vec::new();
+    let (mut red_ids, mut data_ends) = (Vec::new(), Vec::new());
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
@@ -88,7 +90,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                     return Err(Error::malformed("a scan", "a frame header (SOF) before it").at(at));
                 };
                 let header_at = reader.position();
-                frame.read_scan(&mut reader, restart_interval)?;
+                data_ends.extend(frame.read_scan(&mut reader, restart_interval)?);
                 if !red_ids.is_empty() {
                     // Components of a scan stand in the order of the frame.
                     let first = header_at.saturating_add(3);
@@ -106,6 +108,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                     length: reader.position(),
                     adobe,
                     rgb: frame.header.channels == 3 && is_rgb(is_jfif, transform, frame.ids()),
+                    data_ends,
                     red_ids,
                 });
             }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::fields::{Field, Forms, NumberPrefix, goes_on};
+use crate::fields::{Field, Forms, NumberPrefix, Unit, goes_on};
 use crate::file_name::picture_stem;
 use crate::{Error, ErrorKind, Pair, Result};
 
@@ -20,7 +20,7 @@ const MAX_BYTES: usize = 1024;
 /// | `{theta_i:rad}` ... | the same in radians (`:deg` is the default) |
 /// | `{x_i}` `{y_i}` `{z_i}`, `{x_v}` ... | a vector towards the light or the viewer, of any length |
 /// | `{n}` | digits that do not matter |
-/// | `{*}` | anything within one part of the path, or nothing; after a number not `,5`, `p5`, `e1` and the like |
+/// | `{*}` | anything within one part of the path, or nothing; after a number not `,5`, `p5`, `e1`, `rad` and the like |
 /// | other text | itself, without regard to ASCII case |
 ///
 /// A pattern with `/` is compared with as many parts from the end of a path as it has; one without, with the
@@ -147,6 +147,16 @@ fn tokens(part: &str) -> Result<Vec<Token>> {
                     "other text there, as numbers take all digits",
                 );
             }
+            if let Some(Token::Number { field, radians: false }) = tokens.last()
+                && field.is_angle()
+                && Unit::of(text) != Unit::Degrees
+            {
+                let name = field.name();
+                return wrong(
+                    format!("{text:?} behind {{{name}}}, which is in degrees"),
+                    "{theta_i:rad} and so on for radians; other units are not read",
+                );
+            }
             tokens.push(Token::Text(text.to_owned()));
         }
         if rest.is_empty() {
@@ -212,7 +222,8 @@ fn fits(
             lengths.into_iter().flatten().any(|length| {
                 let Some((number, rest)) = text.split_at_checked(length) else { return false };
                 let Ok(value) = number.parse::<f64>() else { return false };
-                if later.first() == Some(&Token::Anything) && goes_on(rest) {
+                let other_unit = !radians && field.is_angle() && Unit::of(rest) != Unit::Degrees;
+                if later.first() == Some(&Token::Anything) && (goes_on(rest) || other_unit) {
                     return false;
                 }
                 let before = values.len();
@@ -248,6 +259,19 @@ mod tests {
         let pair = Pattern::parse(pattern).unwrap().angles(name)?;
         let (l, v) = (pair.light, pair.view);
         Some([l.theta_deg(), l.phi_deg(), v.theta_deg(), v.phi_deg()].map(|a| (a * 1e6).round() / 1e6))
+    }
+
+    #[test]
+    fn another_unit_is_never_read_as_degrees() {
+        for pattern in ["tl{theta_i}rad_pl{phi_i}rad", "{theta_i}_{phi_i}_gon", "{theta_i} grad {phi_i}"] {
+            let error = Pattern::parse(pattern).unwrap_err().to_string();
+            assert!(error.contains("which is in degrees") && error.contains(":rad"), "{error}");
+        }
+        assert!(angles("{theta_i:rad}rad {phi_i:rad}rad", "0.5rad 1rad.png").is_some());
+        assert!(angles("{theta_i:rad}{*}_{phi_i:rad}{*}", "0.5rad_1rad.png").is_some());
+        assert_eq!(angles("{theta_i}{*}_{phi_i}{*}", "15_30rad.png"), None);
+        assert!(angles("{theta_i}_{phi_i}_radius{n}", "15_30_radius7.png").is_some());
+        assert!(angles("{theta_i}deg_{phi_i}\u{b0}{*}", "15deg_30\u{b0}.png").is_some());
     }
 
     #[test]

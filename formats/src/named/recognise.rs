@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::Pattern;
-use crate::fields::{Component, Field, NumberPrefix, Side, digits_are_left};
+use crate::fields::{Component, Field, NumberPrefix, Side, Unit, digits_are_left};
 use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
@@ -46,7 +46,8 @@ enum Labels {
 /// number: `tl` or `theta_l`, `pl` or `phi_l`, or `x_l`, `y_l`, `z_l`, with or without the underscore, where
 /// the side `l`, `i` or `light` is the light and `v`, `o` or `view` the view: `tv15_pv30_tl45_pl60`,
 /// `thetaI=15 phiI=30`, `ti_15_pi_30_to_0_po_0`. Or a label for theta and phi together: `l15_30_v45_60`.
-/// Angles are in degrees. The label may be in the file's name or, for one side, in that of its folder.
+/// Angles are in degrees, or in radians where `rad` stands behind each. The label may be in the file's name or, for one
+/// side, in that of its folder, or of one above that whose label is plain (`view_30_45`, `tv30_pv45`).
 /// Numbers without a label become `{n}`, the rest of the first name stays as it is.
 ///
 /// ```
@@ -68,8 +69,12 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
     };
     let pattern = pattern_of(first).ok_or_else(|| {
         unsupported(
-            format!("the name {first:?}, whose numbers carry no labels of a whole direction, or more digits behind them"),
-            "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0` with decimal points, or a pattern that says what is what",
+            format!(
+                "the name {first:?}, whose numbers carry no labels of a whole direction, or more digits or another unit \
+                 behind them"
+            ),
+            "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0`, degrees with decimal points, or a pattern that says what \
+             is what",
         )
     })?;
     let mut seen = HashMap::new();
@@ -99,6 +104,9 @@ impl Labels {
         let stem = picture_stem(name)?;
         let file = self.fields_of(base(stem))?;
         let parse = |text: &str| Pattern::parse(text).ok().filter(|pattern| pattern.angles(name).is_some());
+        if !units_agree(&file) {
+            return None;
+        }
         let alone = parse(&file);
         if alone.as_ref().is_some_and(Pattern::has_view) {
             return alone;
@@ -109,8 +117,43 @@ impl Labels {
         if folder.is_none() && above.is_some_and(|above| !above.contains(['{', '}'])) {
             return None;
         }
-        let both = folder.and_then(|folder| parse(&format!("{folder}/{file}")));
-        both.filter(Pattern::has_view).or(alone)
+        let below = format!("{}/{file}", folder.as_deref().unwrap_or("{*}"));
+        if !units_agree(&below) {
+            return None;
+        }
+        if let Some(both) = folder.and_then(|_| parse(&below)).filter(Pattern::has_view) {
+            return Some(both);
+        }
+        self.with_folder_above(stem, below, parse, alone)
+    }
+
+    /// The pattern with the label of a folder above the picture's own, `below` being that of the two. Names of folders
+    /// of the user's own lie there as well (`set_v2`), so only plain labels count.
+    fn with_folder_above(
+        self,
+        stem: &str,
+        mut below: String,
+        parse: impl Fn(&str) -> Option<Pattern>,
+        alone: Option<Pattern>,
+    ) -> Option<Pattern> {
+        let parts: Vec<&str> = stem.rsplit(['/', '\\']).skip(2).take(MOST_FOLDERS).collect();
+        for part in parts {
+            let plain = has_plain_label(part);
+            let fields = self.fields_of(part);
+            // One that cannot be read is not passed over.
+            if plain && fields.is_none() {
+                return None;
+            }
+            let fields = fields.filter(|_| plain);
+            below = format!("{}/{below}", fields.as_deref().unwrap_or("{*}"));
+            if !units_agree(&below) {
+                return None;
+            }
+            if let Some(found) = parse(&below).filter(|found| plain && found.has_view()) {
+                return Some(found);
+            }
+        }
+        alone
     }
 
     /// One part of a path with fields for its numbers; `None` if it has braces, which a pattern cannot have.
@@ -130,7 +173,7 @@ impl Labels {
                     let signed =
                         before.strip_suffix('-').filter(|rest| !dashes_separate || rest.ends_with('-'));
                     before = signed.filter(|_| field.may_be_negative()).unwrap_or(before);
-                    Some((braced(field), prefix.all))
+                    Some((braced(field, Unit::of(number.get(prefix.all..)?)), prefix.all))
                 }
                 (Labels::Directions, None, Some((fields, length)))
                     if !another_number(number.get(length..)?) =>
@@ -142,7 +185,8 @@ impl Labels {
             };
             // Digits that belong to no label, right behind a number of one: it may have been read by half.
             if let Some((_, length)) = &found
-                && digits_are_left(number.get(*length..)?)
+                && (digits_are_left(number.get(*length..)?)
+                    || Unit::of(number.get(*length..)?) == Unit::Other)
             {
                 return None;
             }
@@ -215,13 +259,38 @@ fn two_angles(side: Side, text: &str) -> Option<(String, usize)> {
     let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
     let phi = rest.strip_prefix(separator)?;
     let after = phi.get(NumberPrefix::of(phi)?.all..)?;
+    let unit = Unit::of(after);
     let [theta, phi] =
-        [Component::Theta, Component::Phi].map(|component| braced(Field::new(side, component)));
+        [Component::Theta, Component::Phi].map(|component| braced(Field::new(side, component), unit));
     Some((format!("{theta}{separator}{phi}"), text.len().checked_sub(after.len())?))
 }
 
-fn braced(field: Field) -> String {
-    format!("{{{}}}", field.name())
+fn braced(field: Field, unit: Unit) -> String {
+    let unit = if unit == Unit::Radians && field.is_angle() { ":rad" } else { "" };
+    format!("{{{}{unit}}}", field.name())
+}
+
+/// Whether all angles of a pattern are in one unit: a single `rad` may be meant for all of them.
+fn units_agree(pattern: &str) -> bool {
+    let radians = pattern.matches(":rad}").count();
+    let angles = ["{theta_", "{phi_"].map(|start| pattern.matches(start).count());
+    radians == 0 || radians == angles.iter().sum::<usize>()
+}
+
+/// Folders above the picture's own that are looked at for labels.
+const MOST_FOLDERS: usize = 8;
+
+/// Whether a folder's name has a label that no other name would have: a whole word, or one of theta.
+fn has_plain_label(part: &str) -> bool {
+    let mut left = part;
+    while let Some((before, number)) = split_at_digit(left) {
+        let word = ["light", "view"].iter().any(|word| ends_with_word(before, word));
+        if word || number_label(before).is_some_and(|field| !field.may_be_negative()) {
+            return true;
+        }
+        left = after_digits(number);
+    }
+    false
 }
 
 #[cfg(test)]
@@ -288,6 +357,34 @@ mod tests {
             ("a\\tv7,5_pv22\\tl15_pl30.png", ""),
             ("view_7,5_20/light_30_40.png", ""),
             ("view_7_20,5/light_30_40.png", ""),
+            (
+                "view_030_045/exposure1/light_30_40.png",
+                "view_{theta_v}_{phi_v}/exposure{n}/light_{theta_i}_{phi_i}",
+            ),
+            ("m/tv3_pv4/{a}/b/tl1_pl2.png", "tv{theta_v}_pv{phi_v}/{*}/b/tl{theta_i}_pl{phi_i}"),
+            ("light_3_4/raw/view_1_2.png", "light_{theta_i}_{phi_i}/raw/view_{theta_v}_{phi_v}"),
+            ("view_7,5_20/a/light_30_40.png", ""),
+            ("view_1_2_3/a/light_30_40.png", ""),
+            ("/home/v2_3/a/light_30_40.png", "light_{theta_i}_{phi_i}"),
+            ("overview_1_2/a/light_30_40.png", "light_{theta_i}_{phi_i}"),
+            ("/l15_30.png", "l{theta_i}_{phi_i}"),
+            ("tl0.26rad_pl1.57rad.png", "tl{theta_i:rad}rad_pl{phi_i:rad}rad"),
+            (
+                "TL0.26RAD PL1.57rad_TV0rad-pv0 rad.png",
+                "TL{theta_i:rad}RAD PL{phi_i:rad}rad_TV{theta_v:rad}rad-pv{phi_v:rad} rad",
+            ),
+            ("l0.26_1.57rad_v0_0rad.png", "l{theta_i:rad}_{phi_i:rad}rad_v{theta_v:rad}_{phi_v:rad}rad"),
+            ("tl0.26_pl1.57_rad.png", ""),
+            ("tl0.26rad_pl1.57rad_tv0_pv0.png", ""),
+            ("tv0_pv0/tl0.26rad_pl1.57rad.png", ""),
+            ("view_0_0/a/tl0.26rad_pl1.57rad.png", ""),
+            ("tv0_pv0/a/tl0.26rad_pl1.57rad.png", ""),
+            ("tl15deg_pl30\u{b0}.png", "tl{theta_i}deg_pl{phi_i}\u{b0}"),
+            ("tl0.26radpl1.57rad.png", ""),
+            ("tl15grad_pl30grad.png", ""),
+            ("tl15_pl30_gon.png", ""),
+            ("l15_30gon_v0_0gon.png", ""),
+            ("tl15deg30_pl30.png", ""),
         ] {
             let found = recognise([name]).map(|pattern| pattern.to_string()).unwrap_or_default();
             assert_eq!(found, pattern, "{name}");

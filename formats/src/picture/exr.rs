@@ -5,9 +5,10 @@
 //! the header before it has seen that many bytes, takes the last of two attributes of one name, and goes on where the
 //! offset table is damaged.)
 //!
-//! The picture is the data window; the display window is ignored, so that whoever reads a set compares sizes.
-//! Chromaticities and white luminance are not applied. Refused: several parts or layers (a single one is the picture),
-//! deep data, mip maps, subsampled channels, HTJ2K.
+//! The picture is the data window; another display window is told. Beside R, G and B only channels of light are read:
+//! depth, normals and their like are left out and told. Chromaticities and white luminance are not applied. Refused:
+//! several parts, several layers with colours (a single one is the picture), deep data, mip maps, subsampled channels,
+//! HTJ2K.
 //!
 //! Source: "OpenEXR File Layout" of the Academy Software Foundation.
 
@@ -54,7 +55,18 @@ fn of_header(header: &Header) -> PictureHeader {
         linear: true,
         scanlines_are_columns: false,
         orientation: 1,
-        profile: None,
-        layer: header.channels.layer.clone(),
+        profile: header.profile.clone(),
+        remarks: remarks(header),
     }
+}
+
+fn remarks(header: &Header) -> Vec<String> {
+    let layer = header.channels.layer.as_ref().map(|layer| format!("the layer {layer:?} is the picture"));
+    let left_out = header.channels.left_out().join(", ");
+    let left_out = (!left_out.is_empty())
+        .then(|| format!("the channels {left_out}, which are no colours, are left out"));
+    let windows = header.windows.map(|[data, shown]| {
+        format!("the data window {data:?} is the picture, and not the display window {shown:?}")
+    });
+    layer.into_iter().chain(left_out).chain(windows).collect()
 }

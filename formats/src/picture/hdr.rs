@@ -95,8 +95,8 @@ fn of_header(header: &Header) -> PictureHeader {
         scanlines_are_columns: header.scanline_axis() == Axis::Y,
         // The resolution line says where the first pixel lies, and is obeyed.
         orientation: 1,
-        profile: None,
-        layer: None,
+        profile: header.profile.clone(),
+        remarks: Vec::new(),
     }
 }
 

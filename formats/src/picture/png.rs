@@ -3,8 +3,10 @@
 //! Not applied: `gAMA`, `cHRM`, `sRGB`, `iCCP`, `sBIT`. Refused: animations.
 
 mod chunks;
+mod palette;
 mod said;
 
+use std::borrow::Cow;
 use std::io::Cursor;
 
 use ::png::{
@@ -37,7 +39,7 @@ fn of_image(image: &chunks::ImageHeader, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: said.orientation(),
         profile: said.profile(),
-        layer: None,
+        remarks: Vec::new(),
     }
 }
 
@@ -52,7 +54,13 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
     options.set_ignore_iccp_chunk(true);
     let mut decoder = Decoder::new_with_options(Cursor::new(bytes), options);
     decoder.set_limits(Memory { bytes: usize::try_from(limits.max_decoded_bytes).unwrap_or(usize::MAX) });
-    decoder.set_transformations(Transformations::EXPAND);
+    let image = walked.image;
+    // For numbers without a colour the decoder has black.
+    decoder.set_transformations(if image.palette {
+        Transformations::IDENTITY
+    } else {
+        Transformations::EXPAND
+    });
     let mut reader = decoder.read_info().map_err(|e| undecodable(&e))?;
     let Some(len) = reader.output_buffer_size() else {
         return Err(Error::new(ErrorKind::Limit, "a picture", "a size that this machine can address"));
@@ -60,6 +68,18 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
     let mut raw = vec![0; len];
     let decoded = reader.next_frame(&mut raw).map_err(|e| undecodable(&e))?;
     raw.truncate(decoded.buffer_size());
+    let channels = grey_or_rgb(image.grey);
+    if image.palette {
+        let info = reader.info();
+        let part = |part: &Option<Cow<'_, [u8]>>| part.as_deref().unwrap_or_default().to_vec();
+        let samples = palette::expand(&image, &raw, &part(&info.palette), &part(&info.trns))?;
+        return Ok(Picture {
+            width: image.width,
+            height: image.height,
+            channels,
+            samples: Samples::U8(samples),
+        });
+    }
     let samples = match decoded.bit_depth {
         BitDepth::Sixteen => {
             let pairs = raw.chunks_exact(2).map(|pair| pair.iter().fold(0, |v, &b| (v << 8) | u16::from(b)));
@@ -77,8 +97,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
         }
         (_, samples) => samples,
     };
-    let image = walked.image;
-    Ok(Picture { width: image.width, height: image.height, channels: grey_or_rgb(image.grey), samples })
+    Ok(Picture { width: image.width, height: image.height, channels, samples })
 }
 
 fn undecodable(error: &DecodingError) -> Error {

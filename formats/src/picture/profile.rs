@@ -17,12 +17,34 @@ pub(crate) fn of_icc(profile: &[u8]) -> Option<String> {
     (!is_srgb).then(|| format!("the ICC profile {shown:?}"))
 }
 
+/// Chromaticities of sRGB: red, green, blue, white.
+const SRGB_CHROMATICITIES: [f64; 8] = [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329];
+
+/// Differences of chromaticities that come from rounding.
+const ROUNDING: f64 = 0.005;
+
+/// Of chromaticities in the order red, green, blue, white, which may end early; `None` if they are those of sRGB.
+pub(crate) fn of_chromaticities(found: &[f64]) -> Option<String> {
+    let near = |(found, srgb): (&f64, &f64)| (found - srgb).abs() <= ROUNDING;
+    let whole = found.len() >= 2 && found.len() <= SRGB_CHROMATICITIES.len();
+    if whole && found.iter().zip(&SRGB_CHROMATICITIES).all(near) {
+        return None;
+    }
+    let told: Vec<String> = found.iter().take(8).map(|value| format!("{value:.4}")).collect();
+    Some(format!("the primaries {}", told.join(" ")))
+}
+
 /// Of a block of Exif data: a colour space that is none or another than sRGB, as cameras state Adobe RGB.
 pub(crate) fn of_exif(block: &[u8]) -> Option<String> {
     // As for the orientation: not every camera writes the offset of a next directory behind the last.
-    match tiff::exif_colour_space(&[block, &[0; 8]].concat()) {
-        Ok(Some(2)) => Some("the Exif colour space 2 (Adobe RGB)".to_owned()),
-        Ok(Some(0xFFFF)) => Some("the Exif colour space \"uncalibrated\" (Adobe RGB, perhaps)".to_owned()),
+    of_exif_space(tiff::exif_colour_space(&[block, &[0; 8]].concat()).ok().flatten())
+}
+
+/// Of the number of a colour space in Exif data.
+pub(crate) fn of_exif_space(number: Option<u64>) -> Option<String> {
+    match number {
+        Some(2) => Some("the Exif colour space 2 (Adobe RGB)".to_owned()),
+        Some(0xFFFF) => Some("the Exif colour space \"uncalibrated\" (Adobe RGB, perhaps)".to_owned()),
         _ => None,
     }
 }

@@ -9,10 +9,12 @@
 //! multiplies what the directory says before it has held it against anything, refuses some valid LZW tiles at the edge
 //! of a picture, and verifies no checksum of deflate.)
 
+mod colours;
 mod decompress;
 mod directory;
 mod layout;
 mod pixels;
+mod stack;
 
 use super::{Picture, PictureHeader};
 use crate::{Limits, Result, SampleType};
@@ -62,6 +64,6 @@ fn of_layout(layout: &Layout) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: layout.orientation,
         profile: layout.profile.clone(),
-        layer: None,
+        remarks: Vec::new(),
     }
 }

@@ -1,7 +1,7 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
-use crate::fields::{NumberPrefix, digits_are_left};
+use crate::fields::{NumberPrefix, Unit, digits_are_left};
 use crate::file_name::{base, picture_stem};
 use crate::{Error, ErrorKind, Result};
 
@@ -22,7 +22,7 @@ pub struct ImageName {
 /// tiff, hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or
 /// without decimals; theta in 0..=90, phi any (it may be negative). Case, order, separators, and whatever
 /// else the name holds, do not matter, but that no digits may be left right behind an angle (`tl7,5`, `tl7_5`): see
-/// [`half_read`].
+/// [`half_read`]; and no unit other than degrees (`tl0.26rad`).
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{Angles, parse_name};
@@ -62,7 +62,7 @@ fn leading_number(stem: &str) -> Option<u32> {
 /// The number after `key`, which must occur once. A key starts where no letter stands before it, so `atl5` has
 /// none.
 fn angle(stem: &str, key: [u8; 2]) -> Option<f64> {
-    angle_and_rest(stem, key).map(|(angle, _)| angle)
+    angle_and_rest(stem, key).filter(|(_, rest)| Unit::of(rest) == Unit::Degrees).map(|(angle, _)| angle)
 }
 
 /// That number, and what follows it.
@@ -198,6 +198,9 @@ mod tests {
             "tl4.5e+01_pl0_tv22_pv90.jpg",
             "tl7d5_pl0_tv22d5_pv90.jpg",
             "tl7\u{66b}5_pl0_tv22_pv90.jpg",
+            "tl0.26rad_pl1.57rad_tv0rad_pv0rad.jpg",
+            "tl15_pl0_tv22_pv0.5rad.jpg",
+            "tl15 gon pl0 tv22 pv0.jpg",
         ] {
             assert_eq!(parse_name(name), None, "{name:?}");
         }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::ubo2003::Angles;
-use crate::{Direction, Error, ErrorKind, Limits, Result};
+use crate::{Direction, Error, ErrorKind, Limits, Result, six_digits};
 
 /// Angles that differ by less than about half of this are one direction, degrees: above the rounding of a
 /// conversion, below any measurement.
@@ -51,7 +51,9 @@ impl Unique {
     }
 
     fn name(&self, number: usize) -> String {
-        self.list.get(number).map_or_else(String::new, |a| format!("({}, {})", a.theta_deg(), a.phi_deg()))
+        self.list.get(number).map_or_else(String::new, |a| {
+            format!("({}, {})", six_digits(a.theta_deg()), six_digits(a.phi_deg()))
+        })
     }
 }
 

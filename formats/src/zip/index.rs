@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use flate2::{Decompress, FlushDecompress, Status};
+use rawzip::extra_fields::ExtraFieldId;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive};
 
 use super::{cp437, crc32, name, translate};
@@ -220,15 +221,25 @@ fn read_entry(
     limits: &Limits,
 ) -> Result<ZipEntry> {
     let raw_name = record.file_path();
-    let entry_name: Cow<'_, str> = match std::str::from_utf8(raw_name.as_bytes()) {
-        Ok(name) => Cow::Borrowed(name),
-        Err(_) if !record.flags().is_utf8() => Cow::Owned(cp437::decode(raw_name.as_bytes())),
-        Err(_) => {
+    let entry_name: Cow<'_, str> = match (unicode_path(record), std::str::from_utf8(raw_name.as_bytes())) {
+        (Some(name), _) | (None, Ok(name)) => Cow::Borrowed(name),
+        (None, Err(_)) if !record.flags().is_utf8() => Cow::Owned(cp437::decode(raw_name.as_bytes())),
+        (None, Err(_)) => {
             let found = format!("the entry name {}", raw_name.as_bytes().escape_ascii());
             return Err(Error::malformed(found, "UTF-8").at(record.central_directory_offset()));
         }
     };
     check_entry(archive, record, &entry_name, limits).map_err(|e| e.in_entry(&entry_name))
+}
+
+/// The name in the extra field "Unicode Path" (APPNOTE 4.6.9): version 1, the CRC-32 of the name that it replaces, then
+/// UTF-8. Where it is of another version or of another name, that of the header counts.
+fn unicode_path<'a>(record: &'a ZipFileHeaderRecord<'_>) -> Option<&'a str> {
+    let mut fields = record.extra_fields();
+    let (_, data) = fields.find(|(id, _)| *id == ExtraFieldId::INFO_ZIP_UNICODE_PATH)?;
+    let (crc, name) = data.strip_prefix(&[1])?.split_first_chunk()?;
+    let fits = u32::from_le_bytes(*crc) == crc32(record.file_path().as_bytes());
+    std::str::from_utf8(name).ok().filter(|name| fits && !name.is_empty())
 }
 
 fn check_entry(

@@ -184,3 +184,18 @@ fn noise_of_theta_does_not_disturb_the_order_of_a_ring() {
     let positions: Vec<_> = (0..4).map(|light| found.image(0, light).unwrap()).collect();
     assert_eq!(positions, [1, 3, 2, 0]);
 }
+
+#[test]
+fn a_picture_that_is_alone_is_named() {
+    let mut names = names(6, 6);
+    let wrong = names[20].replace("pl120", "pl201");
+    assert_ne!(wrong, names[20]);
+    names[20].clone_from(&wrong);
+    let errors = *catalogue(&names).unwrap_err();
+    assert_eq!(errors.lone, std::slice::from_ref(&wrong));
+    let words = format!("the only picture of its light or view, so perhaps misnamed: 1\n  {wrong:?}");
+    assert!(errors.to_string().contains(&words), "{errors}");
+    // Where every light and view has one picture only, none is.
+    let two = [self::names(2, 2)[0].clone(), self::names(2, 2)[3].clone()];
+    assert_eq!(catalogue(&two).unwrap_err().lone, [""; 0]);
+}

@@ -16,6 +16,7 @@ mod catalogue;
 mod damage;
 mod jpeg;
 mod jpeg_arrangements;
+mod jpeg_ends;
 mod lists;
 mod measured_files;
 mod measured_lists;

@@ -1,7 +1,7 @@
 //! OpenEXR: types, compressions, windows, channels and their order; and what is written.
 
 use btfkit_formats::picture::exr::{Compression, encode};
-use btfkit_formats::picture::{Picture, decode, header};
+use btfkit_formats::picture::{Picture, check, decode, header};
 use btfkit_formats::{ErrorKind, Limits, SampleType, Samples, f16};
 use exr::prelude::{self as openexr, WritableImage};
 
@@ -56,7 +56,7 @@ fn channels_come_in_a_stable_order() {
     for (names, expected) in [
         (vec!["B", "G", "R"], "R G B"),
         (vec!["Z", "Y", "X"], "X Y Z"),
-        (vec!["Y", "R", "B", "G", "depth"], "R G B Y depth"),
+        (vec!["NIR", "R", "B", "G"], "R G B NIR"),
         (vec!["1000nm", "450nm", "450.5", "B", "G", "R"], "R G B 450nm 450.5 1000nm"),
         (
             vec!["S0.700,000000nm", "S0.450,250000nm", "S0.1000,000000nm"],
@@ -95,10 +95,66 @@ fn a_single_layer_is_the_picture() {
     ] {
         let bytes = encode(&exr_picture(3, 3, &names, true), Compression::Zip).unwrap();
         let header = header(&bytes, &Limits::default()).unwrap();
-        assert_eq!(header.layer.as_deref(), Some(layer));
+        assert_eq!(header.remarks, [format!("the layer {layer:?} is the picture")]);
         assert_eq!(header.channels.join(" "), channels);
         assert_eq!(decode(&bytes, &Limits::default()).unwrap().channels.join(" "), channels);
     }
+}
+
+#[test]
+fn beside_colours_only_channels_of_light_are_read() {
+    for (names, read_as, left) in [
+        (vec!["R", "G", "B", "Z"], "R G B", "Z"),
+        (
+            vec!["A", "B", "G", "N.X", "N.Y", "N.Z", "R", "velocity.X", "Z"],
+            "R G B",
+            "N.X, N.Y, N.Z, Z, velocity.X",
+        ),
+        (vec!["R", "G", "B", "X", "Y", "Z", "depth"], "R G B", "X, Y, Z, depth"),
+        (vec!["R", "G", "B", "450nm", "nir", "id"], "R G B 450nm nir", "id"),
+        (vec!["Y", "Z"], "Y", "Z"),
+        (vec!["X", "Y", "Z", "ID"], "X Y Z", "ID"),
+        (vec!["a.R", "a.G", "a.B", "a.A", "b.A", "b.Z"], "R G B", "b.A, b.Z"),
+    ] {
+        // Depth in floats leaves colours halves, and what is left out may be anything.
+        let (half, far) = (f16::from_f32(0.5), vec![1e30f32, f32::NAN]);
+        let channels = names.iter().map(|&name| {
+            let kept = read_as.split(' ').chain(["A"]).any(|kept| kept == name.trim_start_matches("a."));
+            let one = if name.trim_start_matches("a.") == "A" { f16::ONE } else { half };
+            match kept {
+                true => (name, openexr::FlatSamples::F16(vec![one, one])),
+                false => (name, openexr::FlatSamples::F32(far.clone())),
+            }
+        });
+        let bytes = of_channels(2, 1, channels.collect());
+        let header = check(&bytes, &Limits::default()).unwrap();
+        assert_eq!(header.channels.join(" "), read_as);
+        let told = format!("the channels {left}, which are no colours, are left out");
+        assert_eq!(header.remarks.last(), Some(&told));
+        let picture = read(&bytes);
+        assert_eq!(picture.samples, Samples::F16(vec![half; 2 * picture.channels.len()]));
+    }
+    let error = header(
+        &of_channels(
+            1,
+            1,
+            ["Y", "RY", "BY"].map(|name| (name, openexr::FlatSamples::F16(vec![f16::ONE]))).into(),
+        ),
+        &Limits::default(),
+    )
+    .unwrap_err();
+    assert!(error.to_string().contains("chroma"), "{error}");
+}
+
+#[test]
+fn a_display_window_that_is_another_is_told() {
+    let remarks = |shown| {
+        let bytes = crate::picture_files::exr_with_attributes(["R", "G", "B"], None, shown);
+        header(&bytes, &Limits::default()).unwrap().remarks
+    };
+    assert_eq!(remarks(None), remarks(Some(2)));
+    let [only] = remarks(Some(9)).try_into().unwrap();
+    assert_eq!(only, "the data window [0, 0, 1, 0] is the picture, and not the display window [0, 0, 8, 0]");
 }
 
 #[test]
@@ -107,8 +163,8 @@ fn bands_of_renderers_are_wavelengths_and_no_layers() {
     let bytes = encode(&exr_picture(3, 3, &names, true), Compression::None).unwrap();
     let header = header(&bytes, &Limits::default()).unwrap();
     assert_eq!(
-        (header.layer, header.channels.join(" ")),
-        (None, "400.00-430.00nm 430.00-460.00nm 670.00-700.00nm".to_owned())
+        (header.remarks, header.channels.join(" ")),
+        (Vec::new(), "400.00-430.00nm 430.00-460.00nm 670.00-700.00nm".to_owned())
     );
 }
 
@@ -116,7 +172,8 @@ fn bands_of_renderers_are_wavelengths_and_no_layers() {
 fn several_layers_are_refused() {
     for names in [
         vec!["left.R", "left.G", "right.B"],
-        vec!["R", "G", "B", "depth.Z"],
+        vec!["R", "G", "B", "direct.R", "direct.G", "direct.B"],
+        vec!["R", "G", "B", "S1.450,0nm"],
         vec!["S0.450,0nm", "S1.450,0nm"],
         vec!["S1.450,0nm", "S1.500,0nm"],
     ] {

@@ -413,6 +413,37 @@ pub(crate) fn exr_layer(
     out.into_inner()
 }
 
+/// A picture of 2 x 1 pixels with these chromaticities (red, green, blue, white) and this display window's width.
+pub(crate) fn exr_with_attributes(
+    names: [&str; 3],
+    chromaticities: Option<[f32; 8]>,
+    shown: Option<usize>,
+) -> Vec<u8> {
+    let channels =
+        names.map(|name| openexr::AnyChannel::new(name, openexr::FlatSamples::F32(vec![0.5, 0.25])));
+    let layer = openexr::Layer::new(
+        (2, 1),
+        openexr::LayerAttributes::default(),
+        openexr::Encoding::FAST_LOSSLESS,
+        openexr::AnyChannels::sort(channels.into_iter().collect()),
+    );
+    let mut image = openexr::Image::from_layer(layer);
+    let pair = |x, y| openexr::Vec2(x, y);
+    image.attributes.chromaticities =
+        chromaticities.map(|[a, b, c, d, e, f, g, h]| exr::meta::attribute::Chromaticities {
+            red: pair(a, b),
+            green: pair(c, d),
+            blue: pair(e, f),
+            white: pair(g, h),
+        });
+    if let Some(width) = shown {
+        image.attributes.display_window.size.0 = width;
+    }
+    let mut out = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut out).unwrap();
+    out.into_inner()
+}
+
 pub(crate) fn exr_methods() -> Vec<openexr::Compression> {
     use openexr::Compression::{B44, B44A, DWAA, DWAB, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
     vec![Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A, DWAA(None), DWAB(None)]

@@ -153,3 +153,21 @@ fn what_a_png_cannot_hold_is_refused() {
         assert_eq!(encode(&bad).unwrap_err().kind(), ErrorKind::Argument, "{bad:?}");
     }
 }
+
+#[test]
+fn a_number_without_a_colour_is_refused_by_its_place() {
+    for (depth, interlaced) in [(1, false), (2, true), (4, false), (8, true), (8, false)] {
+        let mut png = Png::new(7, 5, depth, 3, interlaced);
+        png.samples.fill(0);
+        png.before = png_chunk(b"PLTE", &[10, 20, 30]);
+        assert_eq!(samples_of(&read(&png.bytes())), [10, 20, 30].repeat(35));
+        png.samples[2 * 7 + 4] = 1;
+        let error = decode(&png.bytes(), &Limits::default()).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Malformed);
+        let words = "the colour number 1 at column 4, row 2, expected one of the 1 of the palette";
+        assert!(error.to_string().contains(words), "{error}");
+        png.before = [png_chunk(b"PLTE", &[10, 20, 30, 1, 2, 3]), png_chunk(b"tRNS", &[255, 9])].concat();
+        let error = decode(&png.bytes(), &Limits::default()).unwrap_err().to_string();
+        assert!(error.contains("not opaque at pixel 18"), "{error}");
+    }
+}

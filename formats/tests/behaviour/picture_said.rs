@@ -138,7 +138,10 @@ fn of_the_words_of_a_png_the_strongest_counts() {
         (vec![gamma(100_000)], Some("the gamma 1.00000 (gAMA)")),
         (vec![gamma(55_556)], Some("the gamma 0.55556 (gAMA)")),
         (vec![gamma(100_000), srgb.clone()], None),
-        (vec![primaries(34_000)], Some("primaries of its own (cHRM)")),
+        (
+            vec![primaries(34_000)],
+            Some("the primaries 0.6400 0.3300 0.3000 0.6000 0.1500 0.0600 0.3400 0.3290"),
+        ),
         (vec![primaries(34_000), gamma(100_000)], Some("the gamma 1.00000 (gAMA)")),
         (vec![cicp([9, 16, 0, 1])], Some("the code points [9, 16, 0, 1] (cICP)")),
         (vec![cicp([9, 16, 0, 1]), srgb.clone()], Some("the code points [9, 16, 0, 1] (cICP)")),
@@ -194,4 +197,64 @@ fn a_turn_is_told_wherever_it_stands() {
     }
     assert_eq!(said(&png(&[png_chunk(b"tEXt", b"Comment\0tiff:Orientation=\"6\"")])).orientation, 1);
     assert_eq!(samples(&all[0]), samples(&tiff(&[])));
+}
+
+#[test]
+fn levels_of_black_and_white_are_told() {
+    // Of rationals the helper writes the halves, so that these are whole numbers of a list here.
+    let full = vec![0, 255, 0, 255, 0, 255];
+    for tags in [vec![], vec![(532, full.clone())], vec![(50714, vec![0, 0, 0])], vec![(50717, vec![255; 3])]]
+    {
+        assert_eq!(said(&tiff(&tags)).profile, None);
+    }
+    for (tags, told) in [
+        (vec![(532, vec![16, 235, 0, 255, 0, 255])], "the reference black and white [16.0, 235.0, 0"),
+        (vec![(532, vec![0])], "the reference black and white [0.0]"),
+        (vec![(50714, vec![0, 4, 0])], "the black level [0.0, 4.0, 0.0]"),
+        (vec![(50717, vec![200])], "the white level [200.0]"),
+        (vec![(50712, vec![0, 1])], "a linearization table"),
+        (vec![(291, vec![0])], "a grey response curve"),
+        (vec![(50714, vec![9]), (50717, vec![200])], "the black level [9.0], with the white level [200.0]"),
+        (
+            vec![(34675, words(&icc("Adobe RGB", 2))), (50717, vec![200])],
+            "the ICC profile \"Adobe RGB\", with the white level [200.0]",
+        ),
+    ] {
+        let found = said(&tiff(&tags)).profile.unwrap();
+        assert!(found.contains(told), "{found}");
+        assert_eq!(samples(&tiff(&tags)), samples(&tiff(&[])));
+    }
+}
+
+#[test]
+fn primaries_are_told_by_every_format_that_has_them() {
+    use crate::picture_files::{HdrCoding, RGBE, exr_with_attributes, hdr_of, rgbe};
+    let (srgb, p3) = (
+        [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329f32],
+        [0.68, 0.32, 0.265, 0.69, 0.15, 0.06, 0.3127, 0.329],
+    );
+    let told = Some("the primaries 0.6800 0.3200 0.2650 0.6900 0.1500 0.0600 0.3127 0.3290");
+    let hdr = |format: &str, primaries: [f32; 8]| {
+        let primaries = primaries.map(|value| value.to_string()).join(" ");
+        let lines = format!("{format}PRIMARIES= {primaries}\n");
+        hdr_of(&lines, "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat)
+    };
+    let exr = |names: [&str; 3], primaries| exr_with_attributes(names, Some(primaries), None);
+    for (bytes, told) in [
+        (hdr(RGBE, srgb), None),
+        (hdr(RGBE, p3), told),
+        (hdr("FORMAT=32-bit_rle_xyze\n", p3), None),
+        (exr(["R", "G", "B"], srgb), None),
+        (exr(["R", "G", "B"], p3), told),
+        (exr(["X", "Y", "Z"], p3), None),
+        // Whole numbers stand in for fractions.
+        (
+            tiff(&[(319, vec![1, 0, 0, 1, 0, 0])]),
+            Some("the primaries 1.0000 0.0000 0.0000 1.0000 0.0000 0.0000"),
+        ),
+    ] {
+        assert_eq!(said(&bytes).profile.as_deref(), told);
+    }
+    let odd = hdr_of(&format!("{RGBE}PRIMARIES=sRGB\n"), "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat);
+    assert!(said(&odd).profile.unwrap().contains("primaries"));
 }

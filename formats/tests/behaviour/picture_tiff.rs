@@ -264,3 +264,42 @@ fn the_picture_is_the_one_that_is_no_smaller_version() {
         }
     }
 }
+
+#[test]
+fn a_stack_in_one_directory_is_refused() {
+    let plane = Tiff::new((4, 3, 1), 8, 1, 3);
+    let samples = tiff_samples(&plane, 12, "u8");
+    let plane = plane.with_strips(&samples, 3, false);
+    let described = |text: &str| {
+        let mut text = text.as_bytes().to_vec();
+        text.resize(text.len().next_multiple_of(4), 0);
+        let words: Vec<u64> =
+            text.chunks(4).map(|word| u64::from(u32::from_le_bytes(word.try_into().unwrap()))).collect();
+        plane.clone().set(270, &words).bytes()
+    };
+    let four_more = vec![7; 48];
+    let five = r#"{"shape": [5, 3, 4]}"#;
+    for (bytes, number) in [
+        (described(five), "5"),
+        (described(r#"{"axes": "ZYX", "shape": [1, 5, 3, 4, 1], "x": [9]}"#), "5"),
+        (described("shape=(5, 3, 4)"), "5"),
+        (described("ImageJ=1.53t\nimages=5\nslices=5\n"), "5"),
+        (plane.clone().set(32997, &[5]).bytes(), "5"),
+        (plane.clone().set(33629, &[0; 30]).bytes(), "30"),
+        (plane.clone().set(279, &[60]).bytes(), "several"),
+    ] {
+        let error = decode(&[bytes, four_more.clone()].concat(), &Limits::default()).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Unsupported);
+        assert!(error.to_string().contains(&format!("a stack of {number} pictures")), "{error}");
+    }
+    // One picture; the description of a stack that it was saved from, without the others; no description of a shape.
+    for bytes in [
+        [described(r#"{"shape": [3, 4]}"#), four_more.clone()].concat(),
+        [described("ImageJ=1.53t\nunit=mm"), four_more.clone()].concat(),
+        [described("the shape [5, 3, 4]"), four_more.clone()].concat(),
+        described(five),
+        plane.clone().set(32997, &[1]).bytes(),
+    ] {
+        assert_eq!(read(&bytes).samples, pattern_samples(12, "u8"));
+    }
+}

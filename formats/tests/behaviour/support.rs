@@ -51,6 +51,8 @@ pub(crate) struct RawEntry {
     pub(crate) data: Vec<u8>,
     /// Sizes in a Zip64 extra field.
     pub(crate) zip64: bool,
+    /// Other extra fields.
+    pub(crate) more: Vec<u8>,
 }
 
 impl RawEntry {
@@ -63,6 +65,7 @@ impl RawEntry {
             uncompressed: data.len() as u64,
             data: data.to_vec(),
             zip64: false,
+            more: Vec::new(),
         }
     }
 
@@ -84,7 +87,7 @@ impl RawEntry {
     }
 
     fn extra(&self) -> Vec<u8> {
-        let mut out = Vec::new();
+        let mut out = self.more.clone();
         if self.zip64 {
             out.extend([1, 0, 16, 0]);
             out.extend(self.uncompressed.to_le_bytes());

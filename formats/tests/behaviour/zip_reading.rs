@@ -231,3 +231,28 @@ fn a_symbolic_link_is_refused() {
     let error = ZipIndex::open(&zip, &Limits::default()).unwrap_err();
     assert!(error.to_string().contains("symbolic link"), "{error}");
 }
+
+#[test]
+fn a_unicode_path_counts_where_it_is_of_the_name() {
+    let field = |version: u8, of: &[u8], name: &[u8]| {
+        let data = [&[version][..], &crate::support::crc32(of).to_le_bytes(), name].concat();
+        [&0x7075u16.to_le_bytes()[..], &(data.len() as u16).to_le_bytes(), &data].concat()
+    };
+    let other = [&[9u8, 9, 1, 0, 7][..], &field(1, b"Gr?n.jpg", "Grün.jpg".as_bytes())].concat();
+    let name_of = |more: Vec<u8>| {
+        let entry = RawEntry { more, ..RawEntry::stored("Gr?n.jpg", b"x") };
+        open(&[entry]).map(|index| index.entries()[0].name().to_owned())
+    };
+    for (more, name) in [
+        (field(1, b"Gr?n.jpg", "Grün.jpg".as_bytes()), "Grün.jpg"),
+        (other, "Grün.jpg"),
+        (field(2, b"Gr?n.jpg", "Grün.jpg".as_bytes()), "Gr?n.jpg"),
+        (field(1, b"another.jpg", "Grün.jpg".as_bytes()), "Gr?n.jpg"),
+        (field(1, b"Gr?n.jpg", b"Gr\xfcn.jpg"), "Gr?n.jpg"),
+        (field(1, b"Gr?n.jpg", b""), "Gr?n.jpg"),
+        (vec![0x75, 0x70, 3, 0, 1, 0, 0], "Gr?n.jpg"),
+    ] {
+        assert_eq!(name_of(more).unwrap(), name);
+    }
+    assert!(name_of(field(1, b"Gr?n.jpg", b"../a.jpg")).unwrap_err().to_string().contains("climbs"));
+}

@@ -1,6 +1,6 @@
 //! How far an enlargement is from real crops of the material, in units of how far those are from each other.
 //!
-//! Only crops are read, and rows that stream by. `docs/judging.md` tells what the figures mean.
+//! Only crops are read, and rows that stream by. `docs/how-to/judge.md` says what the figures mean.
 
 mod crops;
 mod normals;

@@ -1,7 +1,7 @@
 //! How a chunk of samples is packed: two chains of Zarr codecs, and the same without Zarr's machinery in between.
 //!
 //! [`Chain::Stock`] is read by zarr-python as it is installed; [`Chain::Predictive`] packs better and faster, and
-//! is read by zarr-python with `python/btfkit_zarr`. `docs/codec.md` has the bytes and what was measured.
+//! is read by zarr-python with `python/btfkit_zarr`. `docs/reference/codec.md` has the bytes and what was measured.
 
 mod delta;
 mod fused;

@@ -9,26 +9,36 @@ use crate::{Error, Result, SampleType};
 
 #[derive(Debug, Clone)]
 pub(super) struct Channel {
-    /// Without that of its layer.
+    /// As in the file; the decompressor goes by it.
     pub(super) name: String,
+    /// Without that of its layer.
+    shown: String,
+    pub(super) role: Role,
     pub(super) stored: Stored,
     pub(super) quantize_linearly: bool,
 }
 
-impl Channel {
-    pub(super) fn is_alpha(&self) -> bool {
-        self.name == "A"
-    }
+/// What a channel is of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Role {
+    Colour,
+    /// Must be 1 everywhere.
+    Alpha,
+    /// Depth, normals, motion and the like, beside colours.
+    LeftOut,
 }
+
+/// Bands of light that stand beside R, G and B without a wavelength.
+const BANDS: [&str; 4] = ["IR", "NIR", "SWIR", "UV"];
 
 /// The channels of a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Channels {
-    /// As in the file: sorted by name, alpha too.
+    /// As in the file: sorted by name, alpha and those left out too.
     pub(super) stored: Vec<Channel>,
-    /// Numbers of the channels but alpha, in the order in which they are handed out.
+    /// Numbers of the colours, in the order in which they are handed out.
     pub(super) order: Vec<usize>,
-    /// The layer that all of them are in, if they are in one.
+    /// The layer that the picture is in, if it is in one.
     pub(super) layer: Option<String>,
 }
 
@@ -61,12 +71,19 @@ impl Channels {
                 let found = format!("the channel {name:?} with sampling {sampling:?}");
                 return Err(unsupported(found, "a sample at every pixel"));
             }
-            stored.push(Channel { name, stored: kind, quantize_linearly });
+            let (shown, role) = (name.clone(), Role::LeftOut);
+            stored.push(Channel { name, shown, role, stored: kind, quantize_linearly });
         }
-        let layer = only_layer(&stored)?;
-        for channel in stored.iter_mut().filter(|_| layer.is_some()) {
-            channel.name = split_layer(&channel.name).1.to_owned();
+        let layer = layer_of_picture(&stored)?;
+        let mut within: Vec<&mut Channel> = Vec::new();
+        for channel in &mut stored {
+            let (of, rest) = split_layer(&channel.name);
+            if of == layer.as_deref().unwrap_or("") {
+                channel.shown = rest.to_owned();
+                within.push(channel);
+            }
         }
+        give_roles(&mut within)?;
         let order = order_of(&stored);
         if order.is_empty() {
             return Err(unsupported(format!("{} channels", stored.len()), "a channel that is not alpha"));
@@ -78,13 +95,19 @@ impl Channels {
         self.order
             .iter()
             .filter_map(|&number| self.stored.get(number))
-            .map(|channel| channel.name.clone())
+            .map(|channel| channel.shown.clone())
             .collect()
     }
 
-    /// Halves if all channels but alpha are halves.
+    /// Names of the channels that are no part of the picture.
+    pub(super) fn left_out(&self) -> Vec<&str> {
+        let left = self.stored.iter().filter(|channel| channel.role == Role::LeftOut);
+        left.map(|channel| channel.name.as_str()).collect()
+    }
+
+    /// Halves if all colours are halves.
     pub(super) fn sample_type(&self) -> SampleType {
-        let mut colours = self.stored.iter().filter(|channel| !channel.is_alpha());
+        let mut colours = self.stored.iter().filter(|channel| channel.role == Role::Colour);
         if colours.all(|channel| channel.stored == Stored::F16) { SampleType::F16 } else { SampleType::F32 }
     }
 
@@ -126,16 +149,51 @@ fn split_layer(name: &str) -> (&str, &str) {
     wavelength.or_else(|| name.rsplit_once('.')).unwrap_or(("", name))
 }
 
-/// The layer that all channels are in: then what it is called does not matter.
-fn only_layer(channels: &[Channel]) -> Result<Option<String>> {
+/// The layer that all channels are in, or the only one with R, G and B: then what it is called does not matter.
+fn layer_of_picture(channels: &[Channel]) -> Result<Option<String>> {
     let mut layers: Vec<&str> = channels.iter().map(|channel| split_layer(&channel.name).0).collect();
     layers.sort_unstable();
     layers.dedup();
-    match layers.as_slice() {
-        [] | [""] => Ok(None),
-        &[only] if !matches!(only, "S1" | "S2" | "S3") => Ok(Some(only.to_owned())),
-        _ => Err(unsupported(format!("the layers {layers:?}"), "channels without layers, or of one layer")),
+    let has =
+        |layer: &str, colour: &str| channels.iter().any(|one| split_layer(&one.name) == (layer, colour));
+    let with_colours = layers.iter().filter(|layer| RGB.iter().all(|colour| has(layer, colour)));
+    let polarised = layers.iter().any(|layer| matches!(*layer, "S1" | "S2" | "S3"));
+    match (layers.as_slice(), with_colours.collect::<Vec<_>>().as_slice()) {
+        ([], _) => Ok(None),
+        (&[only], _) | (_, &[&only]) if !polarised => {
+            Ok(Some(only.to_owned()).filter(|only| !only.is_empty()))
+        }
+        _ => Err(unsupported(
+            format!("the layers {layers:?}"),
+            "channels without layers, or of one layer, or one layer with R, G and B",
+        )),
     }
+}
+
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// What each channel of the picture's layer is: beside R, G and B, or X, Y and Z, or Y, only wavelengths and bands are
+/// colours too. Without these all are.
+fn give_roles(channels: &mut [&mut Channel]) -> Result<()> {
+    let has = |name: &&str| channels.iter().any(|channel| channel.shown == *name);
+    let colours: &[&str] = match [&RGB[..], &["X", "Y", "Z"], &["Y"]].iter().find(|list| list.iter().all(has))
+    {
+        Some(["Y"]) if has(&"RY") || has(&"BY") => {
+            return Err(unsupported("luminance with chroma (Y, RY, BY)", "R, G and B"));
+        }
+        found => found.copied().unwrap_or_default(),
+    };
+    for channel in channels {
+        let name = channel.shown.as_str();
+        let of_light =
+            wavelength_nm(name).is_some() || BANDS.iter().any(|band| name.eq_ignore_ascii_case(band));
+        channel.role = match name {
+            "A" => Role::Alpha,
+            _ if colours.is_empty() || colours.contains(&name) || of_light => Role::Colour,
+            _ => Role::LeftOut,
+        };
+    }
+    Ok(())
 }
 
 /// R, G, B; then Y, or X, Y, Z; then wavelengths from short to long; then others by name.
@@ -154,12 +212,16 @@ fn order_of(channels: &[Channel]) -> Vec<usize> {
     };
     let mut order: Vec<usize> = Vec::new();
     order.extend(
-        channels.iter().enumerate().filter(|(_, channel)| !channel.is_alpha()).map(|(number, _)| number),
+        channels
+            .iter()
+            .enumerate()
+            .filter(|(_, channel)| channel.role == Role::Colour)
+            .map(|(number, _)| number),
     );
     // Stable, so that equal ranks stay in the order of their names.
     order.sort_by(|&a, &b| {
         let of =
-            |number| channels.get(number).map_or((u8::MAX, 0.0), |channel: &Channel| rank(&channel.name));
+            |number| channels.get(number).map_or((u8::MAX, 0.0), |channel: &Channel| rank(&channel.shown));
         let ((a_rank, a_nm), (b_rank, b_nm)) = (of(a), of(b));
         a_rank.cmp(&b_rank).then(a_nm.total_cmp(&b_nm))
     });

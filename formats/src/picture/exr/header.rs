@@ -3,6 +3,7 @@
 use exr::compression::Compression;
 
 use super::channels::{Channels, text};
+use crate::picture::profile::of_chromaticities;
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
 use crate::{Error, Limits, Result};
@@ -25,14 +26,20 @@ pub(super) struct Header {
     pub(super) tile: Option<(u32, u32)>,
     /// Where the table of chunk offsets starts.
     pub(super) end: usize,
+    /// Primaries that are not those of sRGB, in words.
+    pub(super) profile: Option<String>,
+    /// The data window where the display window is another: left, top, right, bottom of both.
+    pub(super) windows: Option<[[i32; 4]; 2]>,
 }
 
-/// The attributes that say where pixels are; each may be there once.
+/// The attributes that say where pixels are and what they mean; each may be there once.
 #[derive(Default)]
 struct Attributes<'a> {
     channels: Option<&'a [u8]>,
     compression: Option<&'a [u8]>,
     data_window: Option<&'a [u8]>,
+    display_window: Option<&'a [u8]>,
+    chromaticities: Option<&'a [u8]>,
     tiles: Option<&'a [u8]>,
     kind: Option<&'a [u8]>,
     chunk_count: Option<&'a [u8]>,
@@ -59,6 +66,8 @@ impl<'a> Attributes<'a> {
                 "channels" => (&mut attributes.channels, "chlist"),
                 "compression" => (&mut attributes.compression, "compression"),
                 "dataWindow" => (&mut attributes.data_window, "box2i"),
+                "displayWindow" => (&mut attributes.display_window, "box2i"),
+                "chromaticities" => (&mut attributes.chromaticities, "chromaticities"),
                 "tiles" => (&mut attributes.tiles, "tiledesc"),
                 "type" => (&mut attributes.kind, "string"),
                 "chunkCount" => (&mut attributes.chunk_count, "int"),
@@ -101,7 +110,8 @@ impl Header {
         let channels = Channels::read(attributes.channels.ok_or_else(|| missing("channels"))?)?;
         let compression = compression(attributes.compression.ok_or_else(|| missing("compression"))?)?;
         let window = attributes.data_window.ok_or_else(|| missing("dataWindow"))?;
-        let ((width, height), top) = data_window(window)?;
+        let data_window = window_of(window)?;
+        let ((width, height), top) = extent(data_window);
         let stored = u64::try_from(channels.stored.len()).unwrap_or(u64::MAX);
         let size = Size::within((width, height), stored, channels.sample_type(), end, limits)?;
         let tiled = version & FLAG_TILES != 0;
@@ -115,7 +125,15 @@ impl Header {
             let found = format!("a part of type {}", other.escape_ascii());
             return Err(Error::malformed(found, kind).at(end));
         }
-        let header = Header { size, channels, compression, top, tile, end };
+        let coloured =
+            ["R", "G", "B"].iter().all(|colour| channels.names().iter().any(|name| name == colour));
+        let profile = attributes.chromaticities.filter(|_| coloured).and_then(|data| {
+            let values = data.as_chunks::<4>().0.iter().map(|&bytes| f64::from(f32::from_le_bytes(bytes)));
+            of_chromaticities(&values.collect::<Vec<_>>())
+        });
+        let display_window = attributes.display_window.map(window_of).transpose()?;
+        let windows = display_window.filter(|&shown| shown != data_window).map(|shown| [data_window, shown]);
+        let header = Header { size, channels, compression, top, tile, end, profile, windows };
         if let Some(stated) = attributes.chunk_count {
             let stated = Reader::new(stated).i32_le()?;
             if u64::try_from(stated).ok() != Some(header.chunk_count()) {
@@ -160,16 +178,19 @@ fn compression(data: &[u8]) -> Result<Compression> {
     })
 }
 
-/// Width and height, and the number of the first row.
-fn data_window(data: &[u8]) -> Result<((u64, u64), i32)> {
+/// Left, top, right and bottom.
+fn window_of(data: &[u8]) -> Result<[i32; 4]> {
     let mut reader = Reader::new(data);
-    let [left, top] = [reader.i32_le()?, reader.i32_le()?];
-    let [right, bottom] = [reader.i32_le()?, reader.i32_le()?];
+    Ok([reader.i32_le()?, reader.i32_le()?, reader.i32_le()?, reader.i32_le()?])
+}
+
+/// Width and height, and the number of the first row.
+fn extent([left, top, right, bottom]: [i32; 4]) -> ((u64, u64), i32) {
     let len = |first: i32, last: i32| {
         let len = i64::from(last).saturating_sub(i64::from(first)).saturating_add(1);
         u64::try_from(len).unwrap_or(0)
     };
-    Ok(((len(left, right), len(top, bottom)), top))
+    ((len(left, right), len(top, bottom)), top)
 }
 
 fn tile_size(data: &[u8]) -> Result<(u32, u32)> {

@@ -8,7 +8,7 @@ use exr::meta::attribute::{
 };
 use exr::meta::header::Header as ChunkHeader;
 
-use super::channels::Channel;
+use super::channels::{Channel, Role};
 use super::chunks::Chunk;
 use super::header::Header;
 use super::trusted;
@@ -70,7 +70,7 @@ fn read_as<T: Sample>(bytes: &[u8], header: &Header, chunks: &[Chunk]) -> Result
     let channels = header.channels.order.len();
     // Earned: every chunk was found long enough for its pixels.
     let mut out = vec![T::ZERO; header.size.pixels().saturating_mul(channels)];
-    // Of a channel in the file: where it is handed out, unless it is alpha.
+    // Of a channel in the file: where it is handed out, if it is.
     let targets: Vec<Option<usize>> = (0..header.channels.stored.len())
         .map(|number| header.channels.order.iter().position(|&ordered| ordered == number))
         .collect();
@@ -88,7 +88,9 @@ fn read_as<T: Sample>(bytes: &[u8], header: &Header, chunks: &[Chunk]) -> Result
                 let line = reader.take(width.saturating_mul(len))?;
                 let values = line.chunks_exact(len);
                 let Some(target) = target else {
-                    require_opaque(values, channel, first)?;
+                    if channel.role == Role::Alpha {
+                        require_opaque(values, channel, first)?;
+                    }
                     continue;
                 };
                 let start = first.saturating_mul(channels).saturating_add(*target);

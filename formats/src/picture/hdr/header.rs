@@ -1,6 +1,7 @@
 //! The text before the pixels of a Radiance picture: variables, an empty line, the resolution line.
 
 use crate::picture::HdrOrientation;
+use crate::picture::profile::of_chromaticities;
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
 use crate::{Error, Limits, Result, SampleType};
@@ -28,6 +29,8 @@ pub(super) struct Header {
     pub(super) width: u32,
     pub(super) height: u32,
     xyz: bool,
+    /// Primaries that are not those of sRGB, in words.
+    pub(super) profile: Option<String>,
     /// Product of all exposures and colour corrections, by channel.
     factors: [f64; 3],
     /// Scan lines follow each other along the first axis, pixels in a scan line along the second.
@@ -42,30 +45,26 @@ impl Header {
                 return Err(Error::malformed(format!("{other:?}"), "\"#?RADIANCE\" or \"#?RGBE\"").at(0usize));
             }
         }
-        let mut xyz = None;
-        let mut factors = [1.0; 3];
+        let mut said = Said { xyz: None, profile: None, factors: [1.0; 3] };
         for _ in 0..MAX_LINES {
             let at = reader.position();
             let text = line(reader)?;
             if text.is_empty() {
-                let Some(xyz) = xyz else {
-                    return Err(Error::malformed("no FORMAT line", "one before the empty line").at(at));
-                };
-                return Header::read_resolution(reader, xyz, factors, limits);
+                return Header::read_resolution(reader, said, limits);
             }
-            variable(text, &mut xyz, &mut factors).map_err(|e| e.at(at))?;
+            said.hear(text).map_err(|e| e.at(at))?;
         }
         Err(Error::malformed(format!("{MAX_LINES} lines"), "an empty line that ends the header")
             .at(reader.position()))
     }
 
-    fn read_resolution(
-        reader: &mut Reader<'_>,
-        xyz: bool,
-        factors: [f64; 3],
-        limits: &Limits,
-    ) -> Result<Header> {
+    fn read_resolution(reader: &mut Reader<'_>, said: Said, limits: &Limits) -> Result<Header> {
         let at = reader.position();
+        let Said { xyz: Some(xyz), profile, factors } = said else {
+            return Err(Error::malformed("no FORMAT line", "one before the empty line").at(at));
+        };
+        // Primaries say nothing of X, Y and Z.
+        let profile = profile.filter(|_| !xyz);
         let text = line(reader)?;
         let wrong =
             || Error::malformed(format!("the resolution line {text:?}"), "one like \"-Y 480 +X 640\"").at(at);
@@ -81,7 +80,7 @@ impl Header {
             _ => return Err(wrong()),
         };
         let size = Size::within((u64::from(width), u64::from(height)), 3, SampleType::F32, at, limits)?;
-        Ok(Header { width: size.width, height: size.height, xyz, factors, extents: [first, second] })
+        Ok(Header { width: size.width, height: size.height, xyz, profile, factors, extents: [first, second] })
     }
 
     pub(super) fn scanlines(&self) -> u32 {
@@ -185,44 +184,55 @@ fn line<'a>(reader: &mut Reader<'a>) -> Result<&'a str> {
     std::str::from_utf8(text).map_err(|_| Error::malformed("a line that is no text", "text (UTF-8)").at(at))
 }
 
-/// One `NAME=value` line; comments, commands and other names say nothing about the samples.
-fn variable(text: &str, xyz: &mut Option<bool>, factors: &mut [f64; 3]) -> Result<()> {
-    let Some((name, value)) = text.split_once('=') else { return Ok(()) };
-    match name {
-        "FORMAT" => {
-            let found = match value.trim() {
-                "32-bit_rle_rgbe" => false,
-                "32-bit_rle_xyze" => true,
-                other => {
-                    return Err(unsupported(format!("FORMAT={other}"), "32-bit_rle_rgbe or 32-bit_rle_xyze"));
+/// What the variables of a header say.
+struct Said {
+    xyz: Option<bool>,
+    profile: Option<String>,
+    factors: [f64; 3],
+}
+
+impl Said {
+    /// One `NAME=value` line; comments, commands and other names say nothing about the samples.
+    fn hear(&mut self, text: &str) -> Result<()> {
+        let Some((name, value)) = text.split_once('=') else { return Ok(()) };
+        let numbers =
+            || value.split_ascii_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
+        match name {
+            "FORMAT" => {
+                let found = match value.trim() {
+                    "32-bit_rle_rgbe" => false,
+                    "32-bit_rle_xyze" => true,
+                    other => {
+                        let found = format!("FORMAT={other}");
+                        return Err(unsupported(found, "32-bit_rle_rgbe or 32-bit_rle_xyze"));
+                    }
+                };
+                if self.xyz.is_some_and(|before| before != found) {
+                    return Err(Error::malformed("two FORMAT lines that differ", "one"));
                 }
-            };
-            if xyz.is_some_and(|before| before != found) {
-                return Err(Error::malformed("two FORMAT lines that differ", "one"));
+                self.xyz = Some(found);
             }
-            *xyz = Some(found);
-        }
-        "EXPOSURE" | "COLORCORR" => {
-            let wanted = if name == "EXPOSURE" { 1 } else { 3 };
-            let numbers: Option<Vec<f64>> =
-                value.split_ascii_whitespace().map(|word| word.parse().ok()).collect();
-            let numbers =
-                numbers.filter(|list| list.len() == wanted && list.iter().all(|n| n.is_normal() && *n > 0.0));
-            let Some(numbers) = numbers else {
-                return Err(Error::malformed(format!("{text:?}"), format!("{wanted} positive numbers")));
-            };
-            for (factor, number) in factors.iter_mut().zip(numbers.iter().cycle()) {
-                *factor *= number;
+            "EXPOSURE" | "COLORCORR" => {
+                let wanted = if name == "EXPOSURE" { 1 } else { 3 };
+                let positive = |list: &Vec<f64>| list.iter().all(|n| n.is_normal() && *n > 0.0);
+                let Some(numbers) = numbers().filter(|list| list.len() == wanted && positive(list)) else {
+                    return Err(Error::malformed(format!("{text:?}"), format!("{wanted} positive numbers")));
+                };
+                for (factor, number) in self.factors.iter_mut().zip(numbers.iter().cycle()) {
+                    *factor *= number;
+                }
+                if !self.factors.iter().all(|factor| factor.is_normal()) {
+                    let expected = "a product within double precision";
+                    return Err(Error::malformed("exposures out of range", expected));
+                }
             }
-            if !factors.iter().all(|factor| factor.is_normal()) {
-                return Err(Error::malformed("exposures out of range", "a product within double precision"));
+            "PRIMARIES" => self.profile = of_chromaticities(&numbers().unwrap_or_default()),
+            // Not of the format, but written by common code; what another value would mean is not agreed upon.
+            "GAMMA" if value.trim().parse() != Ok(1.0f64) => {
+                return Err(unsupported(format!("{text:?}"), "GAMMA=1, samples in linear light"));
             }
+            _ => {}
         }
-        // Not of the format, but written by common code; what another value would mean is not agreed upon.
-        "GAMMA" if value.trim().parse() != Ok(1.0f64) => {
-            return Err(unsupported(format!("{text:?}"), "GAMMA=1, samples in linear light"));
-        }
-        _ => {}
+        Ok(())
     }
-    Ok(())
 }

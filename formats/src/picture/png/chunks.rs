@@ -23,11 +23,17 @@ pub(super) struct ImageHeader {
     pub(super) height: u32,
     pub(super) grey: bool,
     pub(super) sample_type: SampleType,
-    bits_per_pixel: u64,
+    /// Pixels are numbers of colours.
+    pub(super) palette: bool,
+    pub(super) bits_per_pixel: u64,
     interlaced: bool,
 }
 
 impl ImageHeader {
+    pub(super) fn pixels(&self) -> usize {
+        usize::try_from(u64::from(self.width).saturating_mul(u64::from(self.height))).unwrap_or(usize::MAX)
+    }
+
     fn read(reader: &mut Reader<'_>, limits: &Limits) -> Result<ImageHeader> {
         match reader.take(SIGNATURE.len())? {
             SIGNATURE => {}
@@ -70,6 +76,7 @@ impl ImageHeader {
             height: size.height,
             grey,
             sample_type,
+            palette: colour == 3,
             bits_per_pixel: samples.saturating_mul(u64::from(depth)),
             interlaced: interlace == 1,
         })

@@ -11,9 +11,8 @@ use crate::reader::Reader;
 /// Longest profile or text that is inflated, bytes.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// What gAMA and cHRM hold for sRGB (PNG 3, table 15), times 100000; white, red, green, blue.
+/// What gAMA holds for sRGB (PNG 3, table 15), times 100000.
 const SRGB_GAMMA: u32 = 45_455;
-const SRGB_CHROMATICITIES: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
 
 /// Differences that come from rounding.
 const ROUNDING: u32 = 500;
@@ -77,9 +76,12 @@ impl Said {
                 }
             }
             b"cHRM" => {
-                let same = |(found, srgb): (u32, u32)| found.abs_diff(srgb) <= ROUNDING;
-                if !words(data).zip(SRGB_CHROMATICITIES).all(same) {
-                    self.numbers.get_or_insert_with(|| "primaries of its own (cHRM)".to_owned());
+                // White stands first here.
+                let mut list: Vec<f64> = words(data).map(|word| f64::from(word) / 1e5).collect();
+                let white = list.len().min(2);
+                list.rotate_left(white);
+                if let Some(told) = profile::of_chromaticities(&list) {
+                    self.numbers.get_or_insert(told);
                 }
             }
             b"tEXt" | b"zTXt" | b"iTXt" => self.hear_text(name, data),

@@ -21,25 +21,35 @@ pub(super) mod tag {
     pub(crate) const COMPRESSION: u16 = 259;
     pub(crate) const PHOTOMETRIC: u16 = 262;
     pub(crate) const FILL_ORDER: u16 = 266;
+    pub(crate) const IMAGE_DESCRIPTION: u16 = 270;
     pub(crate) const STRIP_OFFSETS: u16 = 273;
     pub(crate) const ORIENTATION: u16 = 274;
     pub(crate) const SAMPLES_PER_PIXEL: u16 = 277;
     pub(crate) const ROWS_PER_STRIP: u16 = 278;
     pub(crate) const STRIP_BYTE_COUNTS: u16 = 279;
     pub(crate) const PLANAR_CONFIGURATION: u16 = 284;
+    pub(crate) const GRAY_RESPONSE_CURVE: u16 = 291;
+    pub(crate) const TRANSFER_FUNCTION: u16 = 301;
     pub(crate) const PREDICTOR: u16 = 317;
+    pub(crate) const WHITE_POINT: u16 = 318;
+    pub(crate) const PRIMARIES: u16 = 319;
     pub(crate) const TILE_WIDTH: u16 = 322;
     pub(crate) const TILE_LENGTH: u16 = 323;
     pub(crate) const TILE_OFFSETS: u16 = 324;
     pub(crate) const TILE_BYTE_COUNTS: u16 = 325;
-    pub(crate) const TRANSFER_FUNCTION: u16 = 301;
     pub(crate) const SUB_IFDS: u16 = 330;
     pub(crate) const EXTRA_SAMPLES: u16 = 338;
     pub(crate) const SAMPLE_FORMAT: u16 = 339;
+    pub(crate) const REFERENCE_BLACK_WHITE: u16 = 532;
     pub(crate) const XMP: u16 = 700;
+    pub(crate) const IMAGE_DEPTH: u16 = 32997;
+    pub(crate) const METAMORPH_PLANES: u16 = 33629;
     pub(crate) const EXIF_IFD: u16 = 34665;
     pub(crate) const ICC_PROFILE: u16 = 34675;
     pub(crate) const COLOUR_SPACE: u16 = 40961;
+    pub(crate) const LINEARIZATION_TABLE: u16 = 50712;
+    pub(crate) const BLACK_LEVEL: u16 = 50714;
+    pub(crate) const WHITE_LEVEL: u16 = 50717;
 }
 
 /// Directories of one file that are looked at.
@@ -266,6 +276,29 @@ impl<'a> Directory<'a> {
         (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
     }
 
+    /// How many values a tag has; 0 where there is no such tag.
+    pub(super) fn count(&self, tag: u16) -> u64 {
+        self.entries.iter().find(|entry| entry.tag == tag).map_or(0, |entry| entry.count)
+    }
+
+    /// The numbers of a tag, whole or fractions; `None` if there is no such tag, or it is of another type or cut.
+    pub(super) fn reals(&self, tag: u16) -> Option<Vec<f64>> {
+        const RATIONAL: u16 = 5;
+        let entry = self.entries.iter().find(|entry| entry.tag == tag)?;
+        if entry.kind != RATIONAL {
+            return Some(self.list(tag).ok()??.into_iter().map(|value| value as f64).collect());
+        }
+        let (terms, _) = self.bytes_of(tag)?.as_chunks::<4>();
+        let term = |bytes: &[u8; 4]| {
+            f64::from(if self.little_endian {
+                u32::from_le_bytes(*bytes)
+            } else {
+                u32::from_be_bytes(*bytes)
+            })
+        };
+        Some(terms.as_chunks::<2>().0.iter().map(|[over, under]| term(over) / term(under)).collect())
+    }
+
     /// The bytes of a tag of any type, as far as they lie in the file; `None` if there is no such tag.
     pub(super) fn bytes_of(&self, tag: u16) -> Option<&'a [u8]> {
         let entry = self.entries.iter().find(|entry| entry.tag == tag)?;
@@ -314,7 +347,10 @@ fn add_below(directories: &mut Vec<Directory<'_>>) -> Result<()> {
 }
 
 fn told(sizes: &[(u64, u64)]) -> String {
-    sizes.iter().map(|(width, height)| format!("{width} x {height}")).collect::<Vec<_>>().join(" and ")
+    const SHOWN: usize = 4;
+    let shown = sizes.iter().take(SHOWN).map(|(width, height)| format!("{width} x {height}"));
+    let more = sizes.len().checked_sub(SHOWN).filter(|&more| more > 0).map(|more| format!("{more} more"));
+    shown.chain(more).collect::<Vec<_>>().join(" and ")
 }
 
 fn too_many(at: usize) -> Error {

@@ -1,8 +1,9 @@
 //! What the samples of a TIFF are and where they lie in the file.
 
 use super::directory::{Directory, tag};
+use super::{colours, exif_colour_space, stack};
 use crate::picture::size::{Size, unsupported};
-use crate::picture::{grey_or_rgb, orientation, profile};
+use crate::picture::{grey_or_rgb, orientation};
 use crate::{Error, Limits, Result, SampleType};
 
 /// How the bytes of a strip or tile are packed.
@@ -136,7 +137,12 @@ impl Layout {
             Size::within((width, height), stored, sample_type, at, limits)?;
         }
         let little_endian = directory.little_endian();
-        Ok(Layout {
+        let most = match sample_type {
+            SampleType::U8 => Some(255.0),
+            SampleType::U16 => Some(65535.0),
+            SampleType::F16 | SampleType::F32 => None,
+        };
+        let layout = Layout {
             size,
             sample_type,
             alpha,
@@ -145,11 +151,13 @@ impl Layout {
             compression,
             predictor,
             orientation,
-            profile: profile(&directory),
+            profile: colours::said(&directory, exif_colour_space(bytes).ok().flatten(), most),
             rgb,
             chunks,
             places,
-        })
+        };
+        stack::require_single(&directory, &layout, bytes.len())?;
+        Ok(layout)
     }
 
     /// Names of the channels but alpha.
@@ -231,7 +239,8 @@ impl Layout {
                 return Err(Error::malformed(found, format!("enough for {decoded} bytes")).at(offset));
             }
         }
-        self.require_apart()
+        self.require_apart()?;
+        stack::require_short_strips(self)
     }
 
     fn require_apart(&self) -> Result<()> {
@@ -305,16 +314,6 @@ fn stated_orientation(directory: &Directory<'_>, bytes: &[u8]) -> Result<u64> {
     }
     let by_xmp = directory.bytes_of(tag::XMP).map_or(1, orientation::of_xmp);
     Directory::first(bytes)?.number(tag::ORIENTATION, Some(u64::from(by_xmp)))
-}
-
-/// What is said of colours if it is not sRGB.
-fn profile(directory: &Directory<'_>) -> Option<String> {
-    let curve =
-        || directory.bytes_of(tag::TRANSFER_FUNCTION).map(|_| "a transfer function of its own".to_owned());
-    match directory.bytes_of(tag::ICC_PROFILE) {
-        Some(icc) => profile::of_icc(icc),
-        None => curve(),
-    }
 }
 
 fn places(directory: &Directory<'_>) -> Result<(Chunks, Vec<(u64, u64)>)> {

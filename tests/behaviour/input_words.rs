@@ -1,0 +1,129 @@
+//! What is said of inputs that are not what they seem, and how commands end.
+
+use btfkit_formats::picture::exr;
+use btfkit_formats::picture::{self, Picture};
+use btfkit_formats::{Samples, f16};
+
+use crate::fixture::{btf, fail, succeed};
+use crate::odd_archives::{RIGHT, azimuths, png, refused, set, three, told};
+
+#[test]
+fn a_pattern_that_fits_no_name_is_told_with_a_name_and_a_bad_one_is_wrong_use() {
+    let (_folder, root) = set(&three(["a_20_0.png", "a_20_90.png", "a_20_180.png"]));
+    let info = |pattern: &str| {
+        let mut command = btf();
+        command.arg("info").arg(&root).args(["--pattern", pattern]);
+        command
+    };
+    let said = fail(&mut info("b_{theta_i}_{phi_i}.png"), 65);
+    assert!(said.contains("no name fits the pattern \"b_{theta_i}_{phi_i}.png\""), "{said}");
+    assert!(said.contains("a_20_0.png"), "{said}");
+    for pattern in ["a_{theta_i_{phi_i}.png", "{theta_i}", "{theta_i}{phi_i}", "a_{theta_i}rad_{phi_i}"] {
+        let said = fail(&mut info(pattern), 2);
+        assert!(said.contains("--pattern"), "{said}");
+    }
+    succeed(&mut info("a_{theta_i}_{phi_i}.png"));
+    let mut drop = btf();
+    drop.arg("info").arg(&root).args(["--pattern", "a_{theta_i}_{phi_i}.png", "--drop-view"]);
+    let said = fail(drop.arg("99"), 2);
+    assert!(said.contains("no view 99 to drop, there are 1"), "{said}");
+}
+
+#[test]
+fn one_misnamed_picture_of_many_is_named() {
+    let mut files = Vec::new();
+    for view in [0, 90] {
+        for light in [0, 60, 120, 180] {
+            files.push((format!("tl20_pl{light}_tv30_pv{view}.png"), png(9)));
+        }
+    }
+    files[5].0 = "tl20_pl61_tv30_pv90.png".to_owned();
+    let files: Vec<(&str, Vec<u8>)> =
+        files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
+    let (_folder, root) = set(&files);
+    let said = refused(&root);
+    let lone = said.split("perhaps misnamed: ").nth(1).unwrap_or_default();
+    assert!(lone.contains("tl20_pl61_tv30_pv90.png"), "{said}");
+}
+
+#[test]
+fn radians_are_read_where_they_are_said_and_doubted_by_every_command_where_not() {
+    let names = ["tl0.5rad_pl0rad.png", "tl0.5rad_pl1.570796327rad.png", "tl0.5rad_pl3.141592654rad.png"];
+    let (_folder, root) = set(&three(names));
+    assert_eq!(azimuths(&root), RIGHT);
+    assert!(told(&root).contains("tl{theta_i:rad}rad_pl{phi_i:rad}rad"));
+    let (_folder, root) =
+        set(&three(["tl0.5gon_pl0gon.png", "tl0.5gon_pl100gon.png", "tl0.5gon_pl200gon.png"]));
+    assert!(refused(&root).contains("another unit"));
+
+    let (_folder, bare) = set(&three(["tl0.5_pl0.png", "tl0.5_pl1.57.png", "tl0.5_pl3.14.png"]));
+    // Pictures of one value are a fault of their own.
+    let output = |arguments: &[&str]| {
+        let output = btf().args(arguments).arg(&bare).arg("--threads=1").output().unwrap();
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    for arguments in [&["info"][..], &["check"], &["check", bare.to_str().unwrap(), "--json"]] {
+        let said = output(arguments);
+        assert!(said.contains("if the angles are radians"), "{arguments:?}: {said}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&output(&["check", "--json"])).unwrap();
+    assert!(json["notes"][0].as_str().unwrap().contains("radians"));
+}
+
+#[test]
+fn a_label_of_the_view_further_up_is_read() {
+    let (_folder, root) = set(&three([
+        "view_30_45/exposure1/light_20_0.png",
+        "view_30_45/exposure1/light_20_90.png",
+        "view_30_45/exposure1/light_20_180.png",
+    ]));
+    let said = told(&root);
+    assert!(said.contains("theta 30.0 to 30.0") && !said.contains("frontal"), "{said}");
+}
+
+/// An OpenEXR picture of these channels.
+fn of_channels(names: &[&str]) -> Vec<u8> {
+    let channels = names.iter().map(|&name| name.to_owned()).collect();
+    let samples = Samples::F16(vec![f16::from_f32(0.5); 64 * names.len()]);
+    exr::encode(&Picture { width: 8, height: 8, channels, samples }, exr::Compression::Zip).unwrap()
+}
+
+#[test]
+fn channels_that_are_left_out_are_told_and_must_be_the_same() {
+    let (rgb, rgbz) = (of_channels(&["R", "G", "B"]), of_channels(&["R", "G", "B", "Z"]));
+    let (_folder, root) = set(&[("tl20_pl0.exr", rgbz.clone()), ("tl20_pl90.exr", rgbz.clone())]);
+    let said = told(&root);
+    assert!(
+        said.contains("R G B") && said.contains("the channels Z, which are no colours, are left out"),
+        "{said}"
+    );
+    let (_folder, root) = set(&[("tl20_pl0.exr", rgb), ("tl20_pl90.exr", rgbz)]);
+    let said = refused(&root);
+    assert!(said.contains("tl20_pl90.exr") && said.contains("the whole file is the picture"), "{said}");
+}
+
+#[test]
+fn sizes_and_directions_beyond_what_can_be_are_wrong_use() {
+    for size in ["0x5", "65537x5"] {
+        let said = fail(btf().args(["sample", "/nowhere/s.zip", "--size", size]), 2);
+        assert!(said.contains("each from 1 to 65536,"), "{said}");
+    }
+    for view in ["89,1e300", "89,361", "91,0"] {
+        let said = fail(btf().args(["image", "/nowhere/m.zarr", "--out=/nowhere/p.png", "--view", view]), 2);
+        assert!(said.contains("theta 0 to 90, phi -360 to 360"), "{said}");
+    }
+}
+
+#[test]
+fn the_file_of_a_picture_counts_as_memory() {
+    let small = png(9);
+    let text = [&b"tEXt"[..], b"x\0", &[b'a'; 24 << 20]].concat();
+    let length = u32::try_from(text.len() - 4).unwrap().to_be_bytes();
+    let large = [&small[..33], &length, &text, &crc32fast::hash(&text).to_be_bytes(), &small[33..]].concat();
+    assert_eq!(picture::decode(&large, &btfkit_formats::Limits::default()).unwrap().width, 8);
+    let (folder, root) = set(&[("tl20_pl0.png", large)]);
+    let mut import = btf();
+    import.arg("import").arg(&root).arg(folder.path().join("s.zarr")).arg("--memory");
+    let said = fail(import.arg("16MiB"), 2);
+    assert!(said.contains("checking pictures of up to 49 MiB takes 61 MiB"), "{said}");
+}

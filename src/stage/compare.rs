@@ -128,7 +128,7 @@ impl Sums {
         step.unwrap_or(0) as f64 * COLOUR_STEP
     }
 
-    fn add(self, other: Self) -> Self {
+    fn add(self, other: &Self) -> Self {
         let mut colours = self.colours;
         colours.resize(other.colours.len().max(colours.len()), 0);
         colours.iter_mut().zip(&other.colours).for_each(|(count, more)| *count += more);
@@ -221,13 +221,13 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     for view in order {
         let theta = (description.views[view].degrees().0 * 1e6).round() / 1e6;
         match elevations.last_mut() {
-            Some((last, group)) if *last == theta => *group = std::mem::take(group).add(sums[view].clone()),
+            Some((last, group)) if *last == theta => *group = std::mem::take(group).add(&sums[view]),
             _ => elevations.push((theta, sums[view].clone())),
         }
     }
     Ok(Report {
         elevations: elevations.iter().map(|(theta, sums)| sums.errors(Some(*theta))).collect(),
-        all: sums.into_iter().fold(Sums::default(), Sums::add).errors(None),
+        all: sums.iter().fold(Sums::default(), Sums::add).errors(None),
         colour_texels: offsets.len().div_ceil(stride),
     })
 }

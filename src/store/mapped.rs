@@ -218,6 +218,12 @@ impl Drop for Temporary {
     }
 }
 
+/// Waits for a folder that another process has locked, and holds it; none where the file system has no locks.
+pub(super) fn lock_folder(path: &Path) -> Option<File> {
+    let folder = File::open(path).ok()?;
+    folder.lock().ok().map(|()| folder)
+}
+
 /// Whether an open file is the one that lies at a path.
 pub(crate) fn same_file(file: &File, path: &Path) -> bool {
     let place = |data: &fs::Metadata| (data.dev(), data.ino());

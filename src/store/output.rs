@@ -194,8 +194,7 @@ pub fn prepare_seeking(
 pub fn publish_all(files: impl IntoIterator<Item = Ready>) -> Result<Made> {
     let mut files = files.into_iter().peekable();
     // A folder can be locked without a file that would stay. Where a file system has no locks the work goes on without.
-    let folder = files.peek().and_then(|file| File::open(folder_of(&file.path)).ok());
-    let _ = folder.as_ref().map(File::lock);
+    let _folder = files.peek().and_then(|file| mapped::lock_folder(folder_of(&file.path)));
     files.try_fold(Made::Found, |made, file| {
         let published = file.publish()?;
         Ok(if made == Made::Written { made } else { published })

@@ -833,7 +833,11 @@ fn less_address_space_than_it_takes_is_an_error_of_the_system_and_no_advice_to_a
     }
 }
 
-/// The table of docs/reference/safety.md, row by row: a command that ends with each code, and no other code is in the table.
+/// An exit code, why, and a command that ends with it.
+type Ending<'a> = (i32, &'a str, &'a dyn Fn() -> Option<i32>);
+
+/// The table of docs/reference/safety.md, row by row: a command that ends with each code, and no other code is in the
+/// table.
 #[test]
 fn exit_codes_are_those_of_the_table() {
     let folder = tempfile::tempdir().unwrap();
@@ -860,7 +864,7 @@ fn exit_codes_are_those_of_the_table() {
         child.wait().unwrap().code()
     };
     let code = |arguments: &[&str]| btf().args(arguments).output().unwrap().status.code();
-    let cases: &[(i32, &str, &dyn Fn() -> Option<i32>)] = &[
+    let cases: &[Ending<'_>] = &[
         (0, "done", &|| code(&["info", &measurement])),
         (0, "found done", &|| code(&["import", &archive, &measurement])),
         (1, "a limit", &|| {
@@ -887,7 +891,8 @@ fn exit_codes_are_those_of_the_table() {
     for (expected, what, run) in cases {
         assert_eq!(run(), Some(*expected), "{what}");
     }
-    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/safety.md")).unwrap();
+    let page =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/safety.md")).unwrap();
     let (_, table) = page.split_once("## Exit codes").unwrap();
     let rows =
         table.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));

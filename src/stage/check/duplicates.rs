@@ -169,7 +169,7 @@ fn grouped(pairs: impl Iterator<Item = [(usize, usize); 2]>, statistics: &Statis
     }
     let mut groups: Vec<_> = groups.into_iter().collect();
     groups.sort_by_key(|(_, pairs)| std::cmp::Reverse(pairs.len()));
-    let told = |(key, pairs): &([Place; 2], Vec<[(usize, usize); 2]>)| {
+    let told = |key: &[Place; 2], pairs: &[[(usize, usize); 2]]| {
         let [a, b] = key.map(|place| place.named(statistics));
         let [(view, light), _] = pairs[0];
         let shared = match (key[0], pairs.len()) {
@@ -181,7 +181,7 @@ fn grouped(pairs: impl Iterator<Item = [(usize, usize); 2]>, statistics: &Statis
         };
         format!("{a} and {b}{shared}")
     };
-    let mut texts: Vec<String> = groups.iter().take(NAMED).map(told).collect();
+    let mut texts: Vec<String> = groups.iter().take(NAMED).map(|(key, pairs)| told(key, pairs)).collect();
     if let Some(left @ [_, ..]) = groups.get(NAMED..) {
         let pairs = left.iter().map(|(_, pairs)| pairs.len()).sum::<usize>();
         texts.push(format!("and {} more", counted(pairs, "pair")));

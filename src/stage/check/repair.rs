@@ -1,5 +1,5 @@
-//! What to tell `btf import` so that a finding is repaired, beside what it was told already: a reading of the archive is
-//! one set of options, and an option that was given is never advised again.
+//! What to tell `btf import` so that a finding is repaired, beside what it was told already: a reading of the archive
+//! is one set of options, and an option that was given is never advised again.
 
 use super::Report;
 use crate::archive::adapt::{Adaptation, Mirrored, Type};
@@ -59,8 +59,12 @@ fn repaired(given: &Adaptation, repair: &str) -> Option<Adaptation> {
             new.mirrored = of_mirrored([!lights, !views]);
             new.turn_deg = (360 - turned) % 360;
         }
-        ("--azimuth", "mirrored-lights") if turned % 180 == 0 => new.mirrored = of_mirrored([!lights, views]),
-        ("--azimuth", "mirrored-views") if turned % 180 == 0 => new.mirrored = of_mirrored([lights, !views]),
+        ("--azimuth", "mirrored-lights") if turned.is_multiple_of(180) => {
+            new.mirrored = of_mirrored([!lights, views]);
+        }
+        ("--azimuth", "mirrored-views") if turned.is_multiple_of(180) => {
+            new.mirrored = of_mirrored([lights, !views]);
+        }
         ("--drop-view", number) => {
             // By its number in the archive, whose views before it may have been left out.
             let number = number.parse::<usize>().ok()?;

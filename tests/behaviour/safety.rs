@@ -833,7 +833,7 @@ fn less_address_space_than_it_takes_is_an_error_of_the_system_and_no_advice_to_a
     }
 }
 
-/// The table of docs/safety.md, row by row: a command that ends with each code, and no other code is in the table.
+/// The table of docs/reference/safety.md, row by row: a command that ends with each code, and no other code is in the table.
 #[test]
 fn exit_codes_are_those_of_the_table() {
     let folder = tempfile::tempdir().unwrap();
@@ -887,7 +887,8 @@ fn exit_codes_are_those_of_the_table() {
     for (expected, what, run) in cases {
         assert_eq!(run(), Some(*expected), "{what}");
     }
-    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/safety.md")).unwrap();
+    let page =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/safety.md")).unwrap();
     let (_, table) = page.split_once("## Exit codes").unwrap();
     let rows =
         table.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));

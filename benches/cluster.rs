@@ -11,14 +11,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use btfkit::kernel::Kernel;
+use btfkit::method::cluster::centre::CentreRule;
+use btfkit::method::cluster::lloyd::{self, Limits, Method};
+use btfkit::method::cluster::points::{Arrangement, Points, WEIGHT_ONE};
+use btfkit::method::cluster::seeding;
 use btfkit::run::Context;
 use btfkit::run::progress::Silent;
 use btfkit::shape::Size;
 use btfkit::store::measurement::Measurement;
-use btfkit::texel::cluster::centre::CentreRule;
-use btfkit::texel::cluster::lloyd::{self, Limits, Method};
-use btfkit::texel::cluster::points::{Arrangement, Points, WEIGHT_ONE};
-use btfkit::texel::cluster::seeding;
 use serde_json::json;
 
 /// Seconds of the processor that all threads of this process have used, those that ended too.

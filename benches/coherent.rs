@@ -8,10 +8,10 @@ mod processor;
 
 use std::path::Path;
 
-use btfkit::coherent::fit::fit;
-use btfkit::coherent::{FEATURES, Plane};
 use btfkit::kernel::Kernel;
 use btfkit::lattice::WaveCounts;
+use btfkit::method::coherent::fit::fit;
+use btfkit::method::coherent::{FEATURES, Plane};
 use btfkit::random::Hash;
 use btfkit::shape::Size;
 use btfkit::store::model::Model;

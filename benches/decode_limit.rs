@@ -20,7 +20,7 @@ fn main() {
         return;
     };
     let shard: Shard = arguments.get(1).map_or(Shard::WHOLE, |text| text.parse().unwrap());
-    let bytes = btfkit::store::mapped::MappedFile::open(archive.as_ref()).unwrap();
+    let bytes = btfkit::disk::mapped::MappedFile::open(archive.as_ref()).unwrap();
     let index = ZipIndex::open(bytes.as_ref(), &Limits::default()).unwrap();
     let catalogue =
         Catalogue::from_names(index.entries().iter().map(btfkit_formats::zip::ZipEntry::name)).unwrap();

@@ -9,10 +9,10 @@ use std::hint::black_box;
 use std::num::NonZero;
 
 use btfkit::kernel::Kernel;
+use btfkit::method::index::nearest::NearestNormals;
+use btfkit::method::index::nearest::tree::{Neighbour, Tree};
+use btfkit::method::index::scan::{Neighbours, Scan};
 use btfkit::random::Hash;
-use btfkit::texel::nearest::NearestNormals;
-use btfkit::texel::nearest::tree::{Neighbour, Tree};
-use btfkit::texel::scan::{Neighbours, Scan};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use processor::median_ns;
 

@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use btfkit::kernel::predict::Shape;
-use btfkit::store::codec::{Chain, Chunk, ChunkCodec, chunk_codecs, fused};
-use btfkit::store::mapped::MappedStorage;
+use btfkit::zarr::codec::{Chain, Chunk, ChunkCodec, chunk_codecs, fused};
+use btfkit::zarr::storage::MappedStorage;
 use btfkit_formats::SampleType;
 use zarrs::array::{
     Array, ArrayBuilder, ArrayMetadataOptions, ArraySubset, CodecOptions, FillValue, data_type,
@@ -152,7 +152,7 @@ impl<'a> Store<'a> {
         wanted: impl Fn([usize; 3]) -> bool,
         mut f: impl FnMut([usize; 3], &[u8]),
     ) {
-        let map = btfkit::store::mapped::MappedFile::open(&self.shard_path(view)).unwrap();
+        let map = btfkit::disk::mapped::MappedFile::open(&self.shard_path(view)).unwrap();
         let shard: &[u8] = map.as_ref();
         let corners = self.corners();
         let (index, _) = shard[shard.len() - 4 - 16 * corners.len()..].as_chunks::<8>();

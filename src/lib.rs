@@ -7,23 +7,21 @@
 //! archive -import-> measurement -tile, cluster, normals, fit-> model -enlarge-> enlarged index -image-> pictures
 //! ```
 //!
-//! [`stage`] holds one module a step, [`store`] what lies on disk, [`run`] what makes long work
-//! survive, [`texel`], [`mrf`], [`likeness`] and [`color`] the science, [`baseline`] what it is
-//! measured by, [`kernel`] the hot loops.
+//! [`stage`] holds what each command does, [`method`] the steps of the paper as pure computation, [`check`] what can be
+//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean, over [`zarr`]
+//! and [`disk`]. [`run`] makes long work survive, [`kernel`] holds the hot loops.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod archive;
-pub mod baseline;
-pub mod coherent;
+pub mod check;
 pub mod color;
 pub mod demo;
+pub mod disk;
 pub mod error;
-pub mod factor;
-pub mod hdf5;
 pub mod kernel;
 pub mod lattice;
 pub mod likeness;
-pub mod mrf;
+pub mod method;
 pub mod names;
 pub mod picture;
 pub mod random;
@@ -33,9 +31,8 @@ pub mod shape;
 mod signal;
 pub mod stage;
 pub mod store;
-pub mod texel;
 pub mod text;
-pub mod views;
 pub mod words;
+pub mod zarr;
 
 pub use error::{Error, Kind, Result};

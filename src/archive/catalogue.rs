@@ -5,7 +5,7 @@ use std::path::Path;
 use btfkit_formats::named::{self, Pattern, natural_order};
 use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Limits, Pair, rti, table, ubo2003};
 
-use super::files::Files;
+use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
 use super::{Options, list_of_bounded_size, read_beside};
 use crate::error::{Error, Kind, Result};
@@ -277,14 +277,6 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
         pairs[number] = Some(pair);
     }
     Ok((pairs, remark))
-}
-
-pub(super) fn is_picture(name: &str) -> bool {
-    ["jpg", "jpeg", "png", "tif", "tiff", "hdr", "exr"].iter().any(|e| has_extension(name, e))
-}
-
-fn has_extension(name: &str, extension: &str) -> bool {
-    Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }
 
 /// Names of pictures that a note or an error lists.

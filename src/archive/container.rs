@@ -11,9 +11,9 @@ use btfkit_formats::{
 
 use super::adapt::Type;
 use super::{HEAD_BYTES, Options, Source, digest_of, files, read_beside};
+use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
 use crate::run::Context;
-use crate::store::mapped::MappedFile;
 
 /// Groups that the lights of a view are read in: enough for some threads, few enough that what a group has
 /// in common (a block of factors, say) is worked out seldom.
@@ -68,7 +68,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
     } else if head.starts_with(NPY_MAGIC) {
         let beside = directions_beside(path, options, limits)?;
         Container::open(path, ORDER, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
-    } else if crate::hdf5::recognise(&head) {
+    } else if crate::archive::hdf5::recognise(&head) {
         return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples }));
     } else {
         return Ok(None);
@@ -78,12 +78,12 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
 
 #[cfg(feature = "hdf5")]
 fn open_hdf5(path: &Path, limits: &Limits) -> Result<Box<dyn Source>> {
-    Ok(Box::new(super::hdf5::Hdf5::open(path, limits)?))
+    Ok(Box::new(super::hdf5::source::Hdf5::open(path, limits)?))
 }
 
 #[cfg(not(feature = "hdf5"))]
 fn open_hdf5(path: &Path, _: &Limits) -> Result<Box<dyn Source>> {
-    Err(crate::hdf5::not_built_in(path))
+    Err(crate::archive::hdf5::not_built_in(path))
 }
 
 /// The order of images that the user names for a BIG or MIF file.

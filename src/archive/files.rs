@@ -9,8 +9,8 @@ use btfkit_formats::Limits;
 use btfkit_formats::picture;
 use btfkit_formats::zip::{Method, ZipIndex};
 
+use crate::disk::mapped::{self, MappedFile};
 use crate::error::{Error, Result};
-use crate::store::mapped::{self, MappedFile};
 
 /// Folders below the archive's own that are looked into.
 const FOLDER_DEPTH: usize = 8;
@@ -99,7 +99,7 @@ impl Files {
         let (before, hidden) = (self.entries.len(), self.hidden);
         let folder = list.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         self.add_folder(folder, limits)?;
-        if !self.entries.iter().skip(before).any(|entry| super::catalogue::is_picture(&entry.name)) {
+        if !self.entries.iter().skip(before).any(|entry| self::is_picture(&entry.name)) {
             self.entries.truncate(before);
             self.hidden = hidden;
             self.add_folder(&folder.join(".."), limits)?;
@@ -333,4 +333,14 @@ fn list_folder(root: &Path) -> Result<(Vec<PathBuf>, usize)> {
     }
     files.sort();
     Ok((files, hidden))
+}
+
+/// Whether a name is that of a picture.
+pub(super) fn is_picture(name: &str) -> bool {
+    ["jpg", "jpeg", "png", "tif", "tiff", "hdr", "exr"].iter().any(|e| has_extension(name, e))
+}
+
+/// Whether a name ends in an extension, in whatever case.
+pub(super) fn has_extension(name: &str, extension: &str) -> bool {
+    Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
 }

@@ -27,7 +27,7 @@ const OTHER_PICTURES: [&str; 31] = [
 fn is_any_picture(name: &str) -> bool {
     let other =
         |(_, ending): (&str, &str)| OTHER_PICTURES.iter().any(|known| known.eq_ignore_ascii_case(ending));
-    super::catalogue::is_picture(name) || name.rsplit_once('.').is_some_and(other)
+    super::files::is_picture(name) || name.rsplit_once('.').is_some_and(other)
 }
 
 /// What a name is compared by, at each level.
@@ -95,7 +95,7 @@ impl<'a> Matcher<'a> {
             let fits = |&&number: &&usize| {
                 let name = parts(self.names[number]).next_back().unwrap_or_default();
                 at_level(name, level) == wanted
-                    && (level < 3 || is_any_picture(last) && super::catalogue::is_picture(name))
+                    && (level < 3 || is_any_picture(last) && super::files::is_picture(name))
             };
             let found: Vec<usize> = candidates.iter().filter(fits).copied().collect();
             if found.is_empty() {

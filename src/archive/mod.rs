@@ -8,11 +8,9 @@ mod catalogue;
 mod claims;
 mod container;
 mod files;
-#[cfg(feature = "hdf5")]
-mod hdf5;
+pub mod hdf5;
 mod matching;
 mod pictures;
-pub mod views;
 
 use std::io::Read;
 use std::ops::Range;

@@ -2,6 +2,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use btfkit::error::{Error, Result};
+use btfkit::method::cluster::centre::CentreRule;
+use btfkit::method::cluster::lloyd::Limits;
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::{Context, progress};
 use btfkit::stage::cluster::{Amount, First, Step, Stepped};
@@ -9,8 +11,6 @@ use btfkit::stage::import::Shard;
 use btfkit::stage::{cluster, compare, image, normals};
 use btfkit::store::measurement::{self, Measurement};
 use btfkit::store::model::{Model, Stage};
-use btfkit::texel::cluster::centre::CentreRule;
-use btfkit::texel::cluster::lloyd::Limits;
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};

@@ -4,7 +4,7 @@ use btfkit::error::Result;
 use btfkit::lattice::{LatticeChoice, WaveCounts};
 use btfkit::run::Context;
 use btfkit::stage::appearance;
-use btfkit::store::appearance::AppearanceReport;
+use btfkit::store::model::appearance::AppearanceReport;
 use btfkit::words::counted;
 use clap::Args;
 

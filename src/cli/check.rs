@@ -1,11 +1,11 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::archive::views::ArchiveViews;
+use btfkit::check::archive_views::ArchiveViews;
+use btfkit::check::finding::MOST_ALARM;
+use btfkit::check::{self, Finding, Report, State, Statistics};
 use btfkit::error::{Error, Result};
 use btfkit::picture::Ending;
 use btfkit::run::Context;
-use btfkit::stage::check::finding::MOST_ALARM;
-use btfkit::stage::check::{self, Finding, Report, State, Statistics};
 use btfkit::stage::import;
 use btfkit::store::measurement::Measurement;
 use clap::Args;

@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
 use btfkit::error::{Error, Result};
+use btfkit::method::cluster::centre::CentreRule;
+use btfkit::method::cluster::lloyd::Limits;
 use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::stage::cluster::curve;
-use btfkit::texel::cluster::centre::CentreRule;
-use btfkit::texel::cluster::lloyd::Limits;
 use btfkit::words::counted;
 use clap::Args;
 

@@ -1,8 +1,9 @@
 use std::path::Path;
 
 use btfkit::error::{Error, Result};
+use btfkit::picture::deepzoom::Encoding;
 use btfkit::run::Context;
-use btfkit::stage::deepzoom::{self, Encoding};
+use btfkit::stage::deepzoom;
 use btfkit::stage::image::Subject;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};

@@ -1,8 +1,8 @@
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
-use btfkit::coherent::JITTER_ONE;
 use btfkit::error::{Error, Result};
+use btfkit::method::coherent::JITTER_ONE;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::enlarge::patches::Pieces;

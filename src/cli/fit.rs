@@ -1,14 +1,14 @@
 use std::path::{Path, PathBuf};
 
+use btfkit::disk::output::{prepare_bytes, publish_all};
 use btfkit::error::Result;
-use btfkit::mrf;
-use btfkit::mrf::marginals::Matching;
+use btfkit::method::field;
+use btfkit::method::field::marginals::Matching;
 use btfkit::names::with_ending;
 use btfkit::run::Context;
 use btfkit::stage::fit::statistics::{COMPONENTS, Figures};
 use btfkit::stage::fit::{self, sheet};
-use btfkit::store::field::FieldReport;
-use btfkit::store::output::{prepare_bytes, publish_all};
+use btfkit::store::model::field::FieldReport;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
@@ -109,17 +109,17 @@ pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> 
     fit::plan(&fit::Options {
         model: model.into(),
         kind: match options.mrf {
-            Kind::Car3d => mrf::Kind::Car3d,
-            Kind::Car2d => mrf::Kind::Car2d,
+            Kind::Car3d => field::Kind::Car3d,
+            Kind::Car2d => field::Kind::Car2d,
         },
         levels: options.levels,
         coordinates: match options.field {
-            Field::Normals => mrf::Coordinates::Normals,
-            Field::Slopes => mrf::Coordinates::Slopes,
+            Field::Normals => field::Coordinates::Normals,
+            Field::Slopes => field::Coordinates::Slopes,
         },
         gains: match options.gains {
-            Gains::Matched => mrf::Gains::Matched,
-            Gains::None => mrf::Gains::None,
+            Gains::Matched => field::Gains::Matched,
+            Gains::None => field::Gains::None,
         },
         matching: match options.marginals {
             Marginals::Joint => Some(Matching::Joint),

@@ -3,8 +3,8 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use btfkit::disk::temporary::write_file;
 use btfkit::error::{Error, Result};
-use btfkit::store::mapped::write_file;
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::error::{ContextKind, ContextValue, ErrorKind};

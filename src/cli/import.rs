@@ -4,10 +4,10 @@ use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Counted, Progress};
 use btfkit::stage::import::{self, Report, Shard};
-use btfkit::store::codec::Chain;
 use btfkit::store::measurement::Description;
 use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
+use btfkit::zarr::codec::Chain;
 use clap::Args;
 
 use super::each::{Ended, Line, each};

@@ -1,12 +1,12 @@
 use std::path::PathBuf;
 
+use btfkit::disk::output::{prepare_bytes, publish_all};
 use btfkit::error::{Error, Result};
 use btfkit::likeness::Measure;
 use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
-use btfkit::store::output::{prepare_bytes, publish_all};
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;

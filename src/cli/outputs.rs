@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::names::{ends_with, with_ending};
-use btfkit::store::Store;
+use btfkit::zarr::Store;
 
 /// An input and the output to make of it.
 pub(super) struct Pair {

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::coherent::JITTER_ONE;
+use btfkit::method::coherent::JITTER_ONE;
 use btfkit::shape::Area;
 use btfkit::stage::image::{Options, PlaneOptions, Subject, Values};
 use btfkit_formats::Direction;

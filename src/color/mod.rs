@@ -5,6 +5,7 @@
 mod channels;
 mod codes;
 mod display;
+pub mod samples;
 
 pub use channels::{Decoder, Weights, weights};
 pub use codes::{LightnessCodes, Remarkable};

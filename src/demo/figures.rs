@@ -4,13 +4,13 @@ use std::path::Path;
 
 use crate::demo::pictures::{Subject, Workshop};
 use crate::error::{Error, Result};
+use crate::method::tile::seam_visibility;
 use crate::picture::Picture;
 use crate::run::Context;
 use crate::stage::normals::mean_and_spread;
 use crate::stage::{cluster, compare, normals, tile};
-use crate::store::field::FieldReport;
 use crate::store::model::Stage;
-use crate::texel::tile::seam_visibility;
+use crate::store::model::field::FieldReport;
 
 /// Side of the squares whose means tell how patchy a picture is, texels.
 pub(super) const BLOCK: usize = 16;

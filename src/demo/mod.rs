@@ -3,6 +3,7 @@
 //! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
 //! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.
 
+pub mod companion;
 mod figures;
 mod page;
 mod pictures;
@@ -20,8 +21,11 @@ use crate::demo::figures::Figures;
 use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
 use crate::demo::story::Section;
 use crate::demo::times::Times;
+use crate::disk::temporary::write_file;
 use crate::error::Result;
 use crate::lattice::LatticeChoice;
+use crate::method::cluster::centre::CentreRule;
+use crate::method::cluster::lloyd::Limits;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::sample::Kind;
@@ -30,13 +34,10 @@ use crate::stage::cluster::Amount;
 use crate::stage::import::Shard;
 use crate::stage::tile::Choice;
 use crate::stage::{appearance, cluster, compare, enlarge, fit, import, normals, sample, tile};
-use crate::store::codec::Chain;
 use crate::store::enlarged::Enlarged;
-use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
-use crate::texel::cluster::centre::CentreRule;
-use crate::texel::cluster::lloyd::Limits;
+use crate::zarr::codec::Chain;
 
 /// What to demonstrate.
 #[derive(Clone, Debug)]

@@ -6,18 +6,18 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use btfkit_formats::jpeg::{Chroma, EncodeOptions, encode};
 
+use super::companion::{Companion, companion, stands_at};
+use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
+use crate::method::tile::{Cut, Features, Tile, cut};
 use crate::picture::{Picture, false_color};
 use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::stage::image::{cluster_colors, look_up, of_measured_tile, of_measurement};
 use crate::stage::tile::features;
 use crate::store::enlarged::Enlarged;
-use crate::store::mapped::write_file;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
-use crate::texel::companion::{Companion, companion, stands_at};
-use crate::texel::tile::{Cut, Features, Tile, cut};
 use btfkit_formats::Direction;
 
 /// Pictures with a side above this are embedded as JPEG, smaller ones as PNG.

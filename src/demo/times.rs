@@ -6,9 +6,10 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use crate::disk::mapped::MappedFile;
+use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
 use crate::run::recipe;
-use crate::store::mapped::{MappedFile, write_file};
 
 /// A step and the time that it took.
 #[derive(Clone, Debug, Serialize, Deserialize)]

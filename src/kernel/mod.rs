@@ -7,6 +7,7 @@ pub mod coherent;
 pub mod collapse;
 pub mod counting;
 pub mod noise;
+pub mod philox;
 pub mod predict;
 pub mod project;
 pub mod ranking;

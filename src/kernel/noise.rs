@@ -2,7 +2,7 @@
 //! f32 with one order of fused multiply-adds, so that every kernel gives the same bits.
 
 use super::compiled_for_each_kernel;
-use crate::random::{MULTIPLIER, WEYL};
+use super::philox::{MULTIPLIER, WEYL};
 
 /// Where a row of normals lies.
 #[derive(Clone, Copy, Debug)]
@@ -176,7 +176,8 @@ compiled_for_each_kernel! {
 mod tests {
     use super::*;
     use crate::kernel::Kernel;
-    use crate::random::{normal_quantile, philox4x32, unit_interval};
+    use crate::kernel::philox::philox4x32;
+    use crate::random::{normal_quantile, unit_interval};
 
     fn place(row: i32, first_column: i32) -> Place {
         Place { key: [7, 9], domain: 3, row, first_column, channel: 1 }

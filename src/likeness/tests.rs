@@ -63,7 +63,7 @@ const KNOWN: [Known; 4] = [
 
 /// Eight random bits of a place.
 fn noise(y: i64, x: i64, seed: u32) -> i64 {
-    use crate::coherent::hash::mix;
+    use crate::method::coherent::hash::mix;
     i64::from(mix((y as u32).wrapping_mul(0x9E37_79B1) ^ mix((x as u32).wrapping_add(seed))) >> 24)
 }
 

@@ -7,7 +7,7 @@ use image::codecs::tiff::TiffEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 
-use super::stream::refused;
+use super::refused;
 use super::{Bits, Encoding, Ending, Meaning};
 use crate::error::{Error, Result};
 use crate::shape::Size;

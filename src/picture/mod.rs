@@ -1,6 +1,7 @@
 //! Pictures: linear values or false colours, written as PNG, JPEG, WebP or TIFF (display) or EXR (values).
 
 pub mod chart;
+pub mod deepzoom;
 pub mod drawing;
 mod encoded;
 pub mod ending;
@@ -12,9 +13,10 @@ use std::path::Path;
 pub use ending::{Bits, Encoding, Ending};
 
 use crate::color::{srgb_encode, srgb_encode_all};
-use crate::error::Result;
+use crate::disk::output::{Made, Ready};
+use crate::error::{Error, Result};
+use crate::run::Existing;
 use crate::shape::{Size, Window};
-use crate::store::output::{Existing, Made, Ready};
 
 /// What the values of a picture mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -181,6 +183,11 @@ pub fn png(size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
     writer.write_image_data(pixels).map_err(stream::png_failed)?;
     writer.finish().map_err(stream::png_failed)?;
     Ok(bytes)
+}
+
+/// What the operating system refused; the caller knows the path.
+fn refused(error: std::io::Error) -> Error {
+    Error::refused("write", error)
 }
 
 #[cfg(test)]

@@ -9,10 +9,11 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{ChannelDescription, LineOrder, SampleType, Text};
 use exr::meta::header::Header;
 
+use crate::disk::output::{self, Ready, prepare_seeking};
 use crate::error::{Error, Result};
-use crate::picture::{Bits, Encoding, Ending, Meaning, encoded};
+use crate::picture::{Bits, Encoding, Ending, Meaning, encoded, refused};
+use crate::run::Existing;
 use crate::shape::Size;
-use crate::store::output::{self, Existing, Ready, prepare_seeking};
 
 /// Bytes of compressed pixels that are written at once.
 const PIECE_BYTES: usize = 64 << 10;
@@ -90,11 +91,6 @@ pub(super) fn png_failed(error: png::EncodingError) -> Error {
         png::EncodingError::IoError(error) => refused(error),
         error => Error::internal(format!("cannot encode a PNG: {error}")),
     }
-}
-
-/// What the operating system refused; the caller knows the path.
-pub(super) fn refused(error: std::io::Error) -> Error {
-    Error::refused("write", error)
 }
 
 /// An EXR of the values as 32-bit floats, a row a block.

@@ -12,8 +12,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::{Error, Result};
 use crate::run::budget::Allowance;
-use crate::store::output::Existing;
 use progress::Progress;
+
+/// What to do about a file that has the name of a result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Existing {
+    /// Leave it as it is: found done if it is the result, else refused.
+    #[default]
+    Keep,
+    /// Put the result in its place.
+    Replace,
+}
 
 /// What every stage is given besides its options.
 pub struct Context<'a> {

@@ -6,16 +6,18 @@ use btfkit_formats::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use crate::disk::lock::is_lock;
+use crate::disk::temporary;
 use crate::error::Result;
 use crate::stage::verify::is_pyramid;
 use crate::stage::{cluster, deepzoom, normals};
-use crate::store::appearance::AppearanceReport;
 use crate::store::enlarged::{self, Enlarged, Method};
-use crate::store::field::FieldReport;
 use crate::store::measurement::{self, Description, Measurement};
+use crate::store::model::appearance::AppearanceReport;
+use crate::store::model::field::FieldReport;
+use crate::store::model::tile::TileReport;
 use crate::store::model::{self, Model, Stage};
-use crate::store::tile_report::TileReport;
-use crate::store::{Store, is_lock, mapped};
+use crate::zarr::Store;
 
 /// What a store is.
 #[derive(Clone, Debug, Serialize)]
@@ -324,7 +326,7 @@ pub(crate) fn bytes_below(folder: &Path) -> u64 {
             let path = entry.path();
             match entry.metadata() {
                 Ok(data) if data.is_dir() => folders.push(path),
-                Ok(data) if data.is_file() && !mapped::is_temporary(&path) && !is_lock(&path) => {
+                Ok(data) if data.is_file() && !temporary::is_temporary(&path) && !is_lock(&path) => {
                     bytes = bytes.saturating_add(data.len());
                 }
                 _ => {}

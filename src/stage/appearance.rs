@@ -4,18 +4,18 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-use crate::coherent::fit::{Clusters, features, fit};
-use crate::coherent::{FEATURES, MOST_SIDE};
 use crate::color::lab;
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, LatticeChoice, WaveCounts, detect, largest_whole_cells, wave_counts};
+use crate::method::coherent::fit::{Clusters, features, fit};
+use crate::method::coherent::{FEATURES, MOST_SIDE};
+use crate::method::tile::Tile;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::shape::{Size, Window};
-use crate::store::appearance::AppearanceReport;
+use crate::store::model::appearance::AppearanceReport;
 use crate::store::model::{Model, Stage};
-use crate::texel::tile::Tile;
 
 /// How to describe an exemplar.
 #[derive(Clone, Debug)]

@@ -5,9 +5,9 @@ use crate::error::Result;
 use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::stage::import;
-use crate::store::codec::Chain;
-use crate::store::gather::Images;
 use crate::store::measurement::encoded_bytes;
+use crate::store::measurement::gather::Images;
+use crate::zarr::codec::Chain;
 
 /// Chunks that are encoded, spread over the plane.
 const CHUNKS: usize = 16;

@@ -14,10 +14,10 @@ use crate::run::recipe::METHOD;
 use crate::run::units::each_at_once;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
-use crate::store::codec::Chain;
-use crate::store::gather::Images;
+use crate::store::measurement::gather::Images;
 use crate::store::measurement::{Description, Measurement, Origin};
 use crate::words::counted;
+use crate::zarr::codec::Chain;
 
 /// How an archive is turned into a measurement.
 #[derive(Clone, Debug)]

@@ -2,7 +2,6 @@
 
 pub mod about;
 pub mod appearance;
-pub mod check;
 pub mod cluster;
 pub mod compare;
 pub mod deepzoom;

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::Result;
+use crate::method::stereo::Stereo;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, read_ahead};
@@ -15,7 +16,6 @@ use crate::shape::{Size, Window};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
-use crate::texel::stereo::Stereo;
 
 /// Rows of the measurement read at a time: a row of chunks.
 const BAND_ROWS: usize = 16;

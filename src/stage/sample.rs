@@ -7,12 +7,12 @@ use btfkit_formats::ubo2003::{Angles, directions_81, write_name};
 use btfkit_formats::zip::ZipWriter;
 use rayon::prelude::*;
 
+use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::sample::{Kind, Scene, Surface};
 use crate::shape::Size;
-use crate::store::output::{self, Made};
 use crate::words::counted;
 
 /// Memory of a texel of the surface beside its images (measured).
@@ -128,7 +128,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::texel::stereo::Stereo;
+    use crate::method::stereo::Stereo;
     use btfkit_formats::Direction;
 
     #[test]

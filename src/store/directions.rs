@@ -8,8 +8,8 @@
 
 use btfkit_formats::Direction;
 
-use super::{Layout, Store, metadata};
 use crate::error::{Error, Result};
+use crate::zarr::{Layout, Store, metadata};
 
 /// Most directions: triangles count them in u16.
 const MOST: usize = 1 << 16;

@@ -8,7 +8,8 @@ use std::fs;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use super::mapped::{open, write_file};
+use crate::disk::mapped::open;
+use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
 
 /// The file with the way from an enlarged index to its model.

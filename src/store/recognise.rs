@@ -7,10 +7,12 @@ use std::path::Path;
 use btfkit_formats::{big, bonn, mif, mlvq};
 use serde_json::{Value, json};
 
-use super::mapped::{is_temporary, open, special};
-use super::metadata::read_object;
-use super::{enlarged, is_lock, measurement, model};
+use super::{enlarged, measurement, model};
+use crate::disk::lock::is_lock;
+use crate::disk::mapped::{open, special};
+use crate::disk::temporary::is_temporary;
 use crate::error::{Error, Result, is_loop};
+use crate::zarr::metadata::read_object;
 
 /// Bytes that tell one file from another.
 const HEAD_BYTES: u64 = 4096;
@@ -82,7 +84,7 @@ pub fn expect_readable(path: &Path) -> Result<()> {
 pub(super) fn other(path: &Path) -> Result<Option<Other>> {
     let data = match std::fs::metadata(path) {
         Ok(data) => data,
-        Err(error) if super::metadata::is_absent(&error) => return Ok(None),
+        Err(error) if crate::zarr::metadata::is_absent(&error) => return Ok(None),
         Err(error) => return Err(Error::io("read", path, error)),
     };
     if data.is_dir() {

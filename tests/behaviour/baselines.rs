@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
-use btfkit::baseline::{Exemplar, Quilt, Roller, Tiles};
+use btfkit::method::baseline::{Exemplar, Quilt, Roller, Tiles};
 use btfkit::shape::Size;
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::model::Model;

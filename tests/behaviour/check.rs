@@ -2,13 +2,13 @@
 
 use std::sync::atomic::AtomicBool;
 
+use btfkit::check::source::Views;
+use btfkit::check::{self, Place, Report, Severity, State};
 use btfkit::color::{Transfer, srgb_decode, srgb_encode};
 use btfkit::run::Context;
 use btfkit::run::progress::Silent;
 use btfkit::shape::{Size, Window};
-use btfkit::stage::check::{self, Place, Report, Severity, State};
 use btfkit::store::measurement::{Description, Measurement};
-use btfkit::views::Views;
 use btfkit_formats::Samples;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use btfkit::method::cluster::points::Arrangement;
 use btfkit::stage::cluster::{Ended, Report};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::{Model, Stage};
-use btfkit::texel::cluster::points::Arrangement;
 
 use crate::fixture::{assert_same, btf, fail, fixture, succeed};
 

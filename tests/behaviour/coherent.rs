@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use btfkit::coherent::{Plane, Variation};
 use btfkit::kernel::Kernel;
+use btfkit::method::coherent::{Plane, Variation};
 use btfkit::shape::{Size, Window};
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::measurement::Measurement;
@@ -219,7 +219,7 @@ fn killed_and_stopped_it_goes_on_to_the_same_bytes() {
         let code = interrupt(&mut run(&disturbed), signal, || shards() > before);
         assert_eq!(code, if signal == "-TERM" { Some(75) } else { None }, "it ended before {signal}");
     }
-    let host = btfkit::store::mapped::host();
+    let host = btfkit::disk::host();
     std::fs::write(disturbed.join(format!("index/c/0/.0.tmp-{host}-999999999-00000000")), b"x").unwrap();
     succeed(&mut run(&disturbed));
     succeed(&mut run(&whole));

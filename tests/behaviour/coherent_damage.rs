@@ -180,8 +180,8 @@ fn damaged_arrays_of_an_appearance_are_refused() {
 /// Any numbers in the arrays themselves are numbers of some material: they change what is made, and break nothing.
 #[test]
 fn the_largest_weights_are_no_reason_to_fail() {
-    use btfkit::coherent::Plane;
     use btfkit::kernel::Kernel;
+    use btfkit::method::coherent::Plane;
     use btfkit::shape::Size;
     use btfkit::store::model::Model;
     let model = Model::open(&model("cut")).unwrap();

@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use btfkit::coherent::{Appearance, Basis, FEATURES, Plane, Variation, dims_of, hash, levels_of};
 use btfkit::kernel::Kernel;
 use btfkit::lattice::WaveCounts;
+use btfkit::method::coherent::{Appearance, Basis, FEATURES, Plane, Variation, dims_of, hash, levels_of};
 use btfkit::shape::Size;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -160,7 +160,7 @@ fn write_the_example() {
     let size = Size::new(height, width);
     let texels = index.concat();
     let none = WaveCounts::default();
-    let fitted = btfkit::coherent::fit::fit(size.window(), false, &texels, features.clone(), none);
+    let fitted = btfkit::method::coherent::fit::fit(size.window(), false, &texels, features.clone(), none);
     assert_eq!(fitted.levels.len(), levels_of(size));
     let levels = fitted.levels.iter().zip([(1, 0), (3, 20_000), (2, 36_864)]);
     let levels = levels.map(|(basis, (passes, repetition))| Level {

@@ -8,8 +8,8 @@ use btfkit::run::Context;
 use btfkit::shape::{Size, Window};
 use btfkit::stage::verify::{self, Beside, Found};
 use btfkit::store::enlarged::{Description, Enlarged, Texels};
-use btfkit::store::metadata::seal;
 use btfkit::store::model::{Model, Stage};
+use btfkit::zarr::metadata::seal;
 use serde_json::{Value, json};
 
 use crate::coherent_damage::change;

@@ -249,7 +249,7 @@ fn killed_at_any_time_it_goes_on_to_the_same_bytes() {
         assert!(!killed.join("big.dzi").exists());
     }
     // A kill in the middle of a write leaves a temporary file; this one is as if of a dead process.
-    let host = btfkit::store::mapped::host();
+    let host = btfkit::disk::host();
     std::fs::write(killed.join(format!("big_files/10/.0_0.png.tmp-{host}-999999999-00000000")), b"x")
         .unwrap();
     let told = succeed(&mut run(&killed));

@@ -1,10 +1,10 @@
 //! What the stores hold agrees with a plain reading of the equations.
 
+use btfkit::method::stereo::Stereo;
 use btfkit::random::Hash;
 use btfkit::sample::{Kind, Scene, Surface};
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::model::Model;
-use btfkit::texel::stereo::Stereo;
 use btfkit_formats::Direction;
 
 use crate::fixture::fixture;

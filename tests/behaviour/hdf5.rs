@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use ::hdf5::filters::ScaleOffset;
 use ::hdf5::types::{FixedAscii, VarLenUnicode};
 use ::hdf5::{Dataset, File, Group, H5Type};
-use btfkit::hdf5::{Archive, Writer, recognise};
+use btfkit::archive::hdf5::{Archive, Writer, recognise};
 use btfkit::shape::{Size, Window};
 use btfkit::{Kind, Result};
 use btfkit_formats::{Contents, Direction, Limits, SampleType, Samples, f16};

@@ -33,7 +33,7 @@ fn an_import_killed_half_way_goes_on_to_the_same_bytes() {
         assert!(code.is_none() || views == 6, "the import ended before it was killed");
     }
     // A kill in the middle of a write leaves a temporary file; this one is as if of a dead process.
-    let host = btfkit::store::mapped::host();
+    let host = btfkit::disk::host();
     std::fs::write(store.join(format!(".zarr.json.tmp-{host}-999999999-00000000")), b"{").unwrap();
     succeed(btf().arg("import").args([&fixture().archive(), &store]));
     assert_same(&store, &fixture().measurement());

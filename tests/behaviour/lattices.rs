@@ -3,10 +3,10 @@
 use btfkit::archive;
 use btfkit::color::LightnessCodes;
 use btfkit::lattice::{Detection, Lattice, WaveCounts, detect, largest_whole_cells, wave_counts};
+use btfkit::method::components::leading;
 use btfkit::shape::Size;
 use btfkit::stage::tile::Report;
 use btfkit::store::model::{Model, Stage};
-use btfkit::texel::components::leading;
 use btfkit_formats::Samples;
 
 use crate::fixture::{btf, shared, succeed};

@@ -4,18 +4,18 @@
 use std::time::Instant;
 
 use crate::error::{Error, Result};
+use crate::method::cluster::bounds::Centres;
+use crate::method::cluster::lloyd::{self, Clustering, Method};
+use crate::method::cluster::points::Points;
+use crate::method::cluster::search::{Trial, Trials, more_clusters};
+use crate::method::cluster::{seeding, total_distance};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, Plan, Report};
-use crate::store::passes::{History, Passes, State};
-use crate::texel::cluster::bounds::Centres;
-use crate::texel::cluster::lloyd::{self, Clustering, Method};
-use crate::texel::cluster::points::Points;
-use crate::texel::cluster::search::{Trial, Trials, more_clusters};
-use crate::texel::cluster::{seeding, total_distance};
+use crate::store::clustering::{History, Passes, State};
 use crate::words::counted;
 
 impl Plan {

@@ -11,10 +11,10 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::method::cluster::bounds::Centres;
+use crate::method::cluster::lloyd::Pass;
 use crate::stage::cluster::Plan;
-use crate::store::passes::{Found, History};
-use crate::texel::cluster::bounds::Centres;
-use crate::texel::cluster::lloyd::Pass;
+use crate::store::clustering::{Found, History};
 
 /// Texels of the first batch for each of its sample. Texels of one chunk are alike, so that first centres from whole
 /// chunks miss what few chunks have.

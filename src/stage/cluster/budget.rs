@@ -1,11 +1,11 @@
 //! What memory allows: how many bounds a texel has and how many blocks are kept.
 
 use crate::error::Result;
+use crate::method::cluster::seeding;
+use crate::method::cluster::tally::Tally;
 use crate::run::Context;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, First, Plan};
-use crate::texel::cluster::seeding;
-use crate::texel::cluster::tally::Tally;
 use crate::words::counted;
 
 /// The program itself, and what allocators keep.

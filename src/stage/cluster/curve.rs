@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::method::cluster::centre::CentreRule;
+use crate::method::cluster::lloyd::Limits;
+use crate::method::cluster::search::Trials;
 use crate::picture::chart::{Chart, Point};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::{Amount, MOST_CLUSTERS, Options as ClusterOptions, Plan as ClusterPlan};
 use crate::store::model::index_bytes;
-use crate::texel::cluster::centre::CentreRule;
-use crate::texel::cluster::lloyd::Limits;
-use crate::texel::cluster::search::Trials;
 
 /// Texels of the sample to each of the most clusters, at least: of fewer, clusters are hardly more than single texels,
 /// and the error of a sample tells nothing of the others.

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use btfkit_formats::Samples;
 
 use crate::error::Result;
+use crate::method::cluster::distance_matrix;
+use crate::method::cluster::nearest::Near;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
 use crate::stage::cluster::{Ended, PASSES, Plan, Report};
+use crate::store::clustering::{History, Passes};
 use crate::store::model::{Clusters, Representatives, Stage};
-use crate::store::passes::{History, Passes};
-use crate::texel::cluster::distance_matrix;
-use crate::texel::cluster::nearest::Near;
 
 /// A clustering that is over.
 pub(super) struct Clustered {

@@ -4,6 +4,13 @@ use std::ops::Range;
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
+use crate::method::cluster::assign::{Assignment, Texels};
+use crate::method::cluster::bounds::{Centres, Columns, Guide, Steps};
+use crate::method::cluster::lloyd::{self, Pass};
+use crate::method::cluster::nearest::{Farthest, Near, nearer};
+use crate::method::cluster::search::Trial;
+use crate::method::cluster::tally::Tally;
+use crate::method::cluster::total_distance;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::stage::cluster::budget::Budget;
@@ -11,14 +18,7 @@ use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, Plan, Report, Stepped};
 use crate::stage::import::Shard;
-use crate::store::passes::{BatchPass, Found, History, Passes, State};
-use crate::texel::cluster::assign::{Assignment, Texels};
-use crate::texel::cluster::bounds::{Centres, Columns, Guide, Steps};
-use crate::texel::cluster::lloyd::{self, Pass};
-use crate::texel::cluster::nearest::{Farthest, Near, nearer};
-use crate::texel::cluster::search::Trial;
-use crate::texel::cluster::tally::Tally;
-use crate::texel::cluster::total_distance;
+use crate::store::clustering::{BatchPass, Found, History, Passes, State};
 
 /// What follows a pass.
 pub(super) enum Next {

@@ -6,10 +6,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::error::Result;
+use crate::method::cluster::points::Arrangement;
+use crate::method::cluster::selection::{Block, Selection};
 use crate::run::{Context, read_ahead};
 use crate::store::measurement::Measurement;
-use crate::texel::cluster::points::Arrangement;
-use crate::texel::cluster::selection::{Block, Selection};
 
 /// Slots that a thread fills at a time.
 const TOGETHER: usize = 64;

@@ -4,32 +4,29 @@
 //! their rows are there. A run that goes on after an interruption runs the rows through again, but encodes
 //! only tiles that are missing.
 
-mod cascade;
-mod page;
 mod place;
-pub mod pyramid;
 mod verify;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use btfkit_formats::{Direction, jpeg};
+use btfkit_formats::Direction;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
-use crate::picture;
+use crate::picture::deepzoom::cascade::{Cascade, Sink};
+use crate::picture::deepzoom::pyramid::Pyramid;
+use crate::picture::deepzoom::{Encoding, page};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, read_ahead};
-use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
-use crate::store::mapped::write_file;
-use cascade::{Cascade, Sink};
+
 use place::Place;
-use pyramid::Pyramid;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
@@ -40,43 +37,6 @@ const NOTES: &str = "notes";
 
 /// Memory for what does not grow with the picture: the program itself, threads, packers.
 const FIXED_BYTES: u64 = 16 << 20;
-
-/// Format of the tiles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    /// Lossless.
-    Png,
-    /// Lossy, of a quality from 1 to 100.
-    Jpeg(u8),
-}
-
-impl Encoding {
-    /// Ending of the names of tiles.
-    pub fn ending(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Jpeg(_) => "jpg",
-        }
-    }
-
-    fn recipe(self) -> Value {
-        match self {
-            Self::Png => json!("png"),
-            Self::Jpeg(quality) => json!({"jpeg": quality}),
-        }
-    }
-
-    /// The file of 8-bit pixels.
-    fn encode(self, size: Size, pixels: &[u8]) -> Result<Vec<u8>> {
-        match self {
-            Self::Png => picture::png(size, pixels),
-            Self::Jpeg(quality) => {
-                let options = jpeg::EncodeOptions { quality, progressive: false, chroma: jpeg::Chroma::Half };
-                Ok(jpeg::encode(pixels, size.width as u32, size.height as u32, 3, &options)?)
-            }
-        }
-    }
-}
 
 /// What to show, and how.
 #[derive(Clone, Debug)]

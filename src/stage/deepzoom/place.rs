@@ -8,13 +8,18 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use super::Encoding;
+use crate::disk::lock::is_lock;
+use crate::disk::output::expect_outside_stores;
+use crate::disk::output::{holds, settle};
+use crate::disk::temporary;
+use crate::disk::temporary::Temporary;
 use crate::error::{Error, Result};
+use crate::picture::deepzoom::Encoding;
+use crate::run::Existing;
 use crate::run::{Context, recipe};
-use crate::store::mapped::{self, MappedStorage, Temporary};
-use crate::store::output::{Existing, expect_outside_stores, holds, settle};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
-use crate::store::{FORMAT, Store, is_lock, metadata};
+use crate::zarr::storage::MappedStorage;
+use crate::zarr::{FORMAT, Store, metadata};
 
 /// The files of a pyramid.
 pub(super) struct Place {
@@ -83,7 +88,7 @@ impl Place {
             return recipe::expect_same(&self.description, &found, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry.is_ok_and(|entry| mapped::is_temporary(&entry.path()) || is_lock(&entry.path()))
+            entry.is_ok_and(|entry| temporary::is_temporary(&entry.path()) || is_lock(&entry.path()))
         };
         let strange = std::fs::read_dir(&self.folder).is_ok_and(|mut entries| !entries.all(is_ours));
         let occupied = [(&self.folder, strange || self.folder.is_file())]
@@ -162,7 +167,7 @@ impl Place {
                 _ => {}
             }
         }
-        mapped::remove_folder(&self.folder, |path| {
+        temporary::remove_folder(&self.folder, |path| {
             let is_tile = path.extension().is_some_and(|ending| ending == "png" || ending == "jpg");
             is_tile && path.components().count() == 2 || path == Path::new(STATE)
         })

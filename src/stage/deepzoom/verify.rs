@@ -7,19 +7,21 @@ use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
+use super::TILE_SIDES;
 use super::place::Place;
-use super::pyramid::Pyramid;
-use super::{Encoding, TILE_SIDES, page};
+use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
+use crate::picture::deepzoom::Encoding;
+use crate::picture::deepzoom::page;
+use crate::picture::deepzoom::pyramid::Pyramid;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::Size;
 use crate::stage::about::{Kept, Pyramidal, bytes_below};
 use crate::stage::verify::Report;
-use crate::store::checksums::DIGITS;
-use crate::store::mapped::MappedFile;
-use crate::store::metadata;
 use crate::store::recognise::PYRAMID_FOLDER;
+use crate::zarr::checksums::DIGITS;
+use crate::zarr::metadata;
 
 /// The member of the state of a finished pyramid that holds the checksums of its tiles.
 pub(super) const CHECKSUMS: &str = "checksums";

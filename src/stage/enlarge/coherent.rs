@@ -4,9 +4,9 @@ use serde_json::{Map, Value, json};
 
 use super::blocks::{self, Kept, Tile};
 use super::{Output, Rule, Subject, Units};
-use crate::coherent::{Plane, Variation};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
+use crate::method::coherent::{Plane, Variation};
 use crate::run::Context;
 use crate::stage::image::of_stage;
 use crate::store::enlarged::Method;

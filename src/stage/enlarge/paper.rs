@@ -7,16 +7,16 @@ use super::pipeline::{Band, Chooser, Pipeline, Source};
 use super::{Output, Rule, Subject, Units};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
-use crate::mrf::{Extent, Surface, Synthesis};
+use crate::method::field::{Extent, Surface, Synthesis};
+use crate::method::index::nearest::NearestNormals;
+use crate::method::index::scan::Scan;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe;
 use crate::shape::{Size, Window};
 use crate::stage::import::Shard;
-use crate::store::enlarge_state::EnlargeState;
+use crate::store::enlarged::state::EnlargeState;
 use crate::store::enlarged::{Description, Enlarged, Method, SHARD_SIDE, Texels};
-use crate::texel::nearest::NearestNormals;
-use crate::texel::scan::Scan;
 use crate::words::counted;
 
 /// Candidates unless their number is given.

@@ -4,8 +4,8 @@ use serde_json::{Map, Value, json};
 
 use super::blocks::{self, Kept, Tile};
 use super::{Output, Rule, Subject, Units};
-use crate::baseline::{Exemplar, Repeat, Roller, Tiles};
 use crate::error::{Error, Result};
+use crate::method::baseline::{Exemplar, Repeat, Roller, Tiles};
 use crate::run::Context;
 use crate::shape::{Size, Window};
 use crate::store::enlarged::Method;

@@ -4,10 +4,10 @@
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::mrf::{Surface, Synthesis};
+use crate::method::field::{Surface, Synthesis};
+use crate::method::index::nearest::NearestNormals;
+use crate::method::index::scan::{Neighbours, Scan};
 use crate::store::enlarged::SHARD_SIDE;
-use crate::texel::nearest::NearestNormals;
-use crate::texel::scan::{Neighbours, Scan};
 
 /// Texels whose candidates are sought in one go.
 const TEXELS_AT_ONCE: usize = 512;

@@ -3,9 +3,9 @@
 use btfkit_formats::Contents;
 
 use super::{Options, Written};
+use crate::archive::hdf5::Writer;
 use crate::color::Transfer;
 use crate::error::Result;
-use crate::hdf5::Writer;
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 use crate::store::measurement::Measurement;

@@ -12,12 +12,12 @@ use btfkit_formats::{SampleType, Samples};
 
 use crate::archive::adapt::half;
 use crate::color::Transfer;
+use crate::disk::output::{Made, expect_outside_stores};
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
-use crate::store::gather::images_of_texels;
 use crate::store::measurement::Measurement;
-use crate::store::output::{Made, expect_outside_stores};
+use crate::store::measurement::gather::images_of_texels;
 
 /// A view as it is read, turned into images, and encoded.
 const VIEW_COPIES: u64 = 4;
@@ -100,13 +100,13 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
     Ok(Report { made, bytes: bytes_of(&options.output), warnings })
 }
 
-#[cfg(feature = "hdf5")]
-use self::hdf5::write as hdf5;
 use crate::words::counted;
+#[cfg(feature = "hdf5")]
+use hdf5::write as hdf5;
 
 #[cfg(not(feature = "hdf5"))]
 fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Written> {
-    Err(crate::hdf5::not_built_in(&options.output))
+    Err(crate::archive::hdf5::not_built_in(&options.output))
 }
 
 fn bytes_of(path: &Path) -> u64 {

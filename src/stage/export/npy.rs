@@ -6,10 +6,10 @@ use btfkit_formats::npy::{channels_file, directions_file, header, sample_bytes};
 
 use super::{Options, Written, for_each_view};
 use crate::color::Transfer;
+use crate::disk::output;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::store::measurement::Measurement;
-use crate::store::output;
 
 pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = measurement.description();

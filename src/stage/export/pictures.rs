@@ -11,11 +11,11 @@ use rayon::prelude::*;
 
 use super::{Options, Written, for_each_view, linear};
 use crate::color::srgb_encode_u8;
+use crate::disk::output;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::stage::loss::{self, Beyond, Takes};
 use crate::store::measurement::{Description, Measurement};
-use crate::store::output;
 
 /// Format of the pictures in a folder.
 #[derive(Clone, Copy, PartialEq, Eq)]

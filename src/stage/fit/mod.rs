@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use crate::error::Result;
-use crate::mrf::marginals::Matching;
-use crate::mrf::{self, Boundary, Coordinates, Gains, Surface};
+use crate::method::field::marginals::Matching;
+use crate::method::field::{self, Boundary, Coordinates, Gains, Surface};
+use crate::method::tile::Tile;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
-use crate::store::field::FieldReport;
+use crate::store::model::field::FieldReport;
 use crate::store::model::{Model, Stage};
-use crate::texel::tile::Tile;
 
 /// Memory of a texel of the tile: the pyramids, their moments, and a synthesis for each number of levels (measured).
 const TEXEL_BYTES: u64 = 2300;
@@ -29,7 +29,7 @@ pub struct Options {
     /// The model with the normal map.
     pub model: PathBuf,
     /// Channels together or one by one.
-    pub kind: mrf::Kind,
+    pub kind: field::Kind,
     /// Levels of the pyramid; as many as the data carry where absent.
     pub levels: Option<usize>,
     /// What the channels of the field are.
@@ -45,7 +45,7 @@ impl Options {
     pub fn of(model: PathBuf) -> Self {
         Self {
             model,
-            kind: mrf::Kind::Car3d,
+            kind: field::Kind::Car3d,
             levels: None,
             coordinates: Coordinates::Normals,
             gains: Gains::Matched,
@@ -100,7 +100,7 @@ impl Plan {
         let normals = self.model.normals()?;
         let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
         let boundary = boundary_of(&tile);
-        let options = mrf::Options { kind, levels, gains, boundary };
+        let options = field::Options { kind, levels, gains, boundary };
         let surface =
             context.compute(|| Surface::fit(tile.size, &normals, coordinates, matching, &options))?;
         self.model.write_surface(&surface)?;

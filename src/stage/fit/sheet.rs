@@ -1,7 +1,7 @@
 //! The statistics of a synthesis and its tile on a sheet.
 
 use super::statistics::{COMPONENTS, Comparison, Statistics};
-use crate::mrf::second_order::Autocovariance;
+use crate::method::field::fit::second_order::Autocovariance;
 use crate::picture::drawing::{Canvas, INK};
 use crate::picture::{Picture, false_color};
 use crate::shape::Size;

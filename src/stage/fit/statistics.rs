@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::kernel::Kernel;
-use crate::mrf::second_order::{Autocovariance, Lags, variances};
-use crate::mrf::{Boundary, Coordinates, Extent, Field, Surface, Synthesis, pyramid};
+use crate::method::field::fit::second_order::{Autocovariance, Lags, variances};
+use crate::method::field::{Boundary, Coordinates, Extent, Field, Surface, Synthesis, pyramid};
 use crate::shape::Size;
 
 /// Names of the components.

@@ -6,7 +6,11 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::color::Decoder;
+use crate::disk::output::Made;
 use crate::error::{Error, Result};
+use crate::method::tile::Tile;
+use crate::method::value::evaluate::{Appearance, add};
+use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::{Encoding, Ending, Picture, stream};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
@@ -14,10 +18,6 @@ use crate::shape::{Area, Size, Window};
 use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
-use crate::store::output::Made;
-use crate::texel::evaluate::{Appearance, add};
-use crate::texel::tile::Tile;
-use crate::texel::triangulation::{Interpolator, triangulate};
 use btfkit_formats::{Direction, Samples};
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
@@ -74,7 +74,7 @@ pub enum Values {
 pub struct PlaneOptions {
     /// Another seed gives another plane.
     pub seed: u32,
-    /// See [`crate::coherent::Variation`]; by the model where absent.
+    /// See [`crate::method::coherent::Variation`]; by the model where absent.
     pub jitter: Option<u32>,
 }
 

@@ -10,21 +10,21 @@ use super::{
     Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, expect_colors, look_up, mixed,
     of_measured_tile,
 };
-use crate::coherent::{Plane, Variation};
 use crate::color::Decoder;
 use crate::error::{Error, Kind, Result};
 use crate::kernel::Kernel;
+use crate::method::coherent::{Plane, Variation};
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::{measurement_name, open_measurement_of};
 use crate::stage::loss::Beyond;
-use crate::store::Store;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
 use crate::store::origin;
 use crate::words::counted;
+use crate::zarr::Store;
 
 /// Rows of a measurement that are decoded together: a row of chunks.
 pub(super) const MEASUREMENT_ROWS: usize = 16;

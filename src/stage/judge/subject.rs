@@ -4,14 +4,14 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::coherent::{Plane, Variation};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
+use crate::method::coherent::{Plane, Variation};
 use crate::shape::{Area, Size, Window};
 use crate::stage::image::{model_of, of_stage, plane_rows};
-use crate::store::Store;
 use crate::store::enlarged::{self, CHUNK_SIDE, Enlarged};
 use crate::store::model::{self, Model, Stage};
+use crate::zarr::Store;
 
 /// Rows and columns of a plane that are made at once.
 const PLANE_SIDE: usize = 512;

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
+use crate::method::tile::LONGEST_SIDE;
 use crate::shape::Size;
-use crate::texel::tile::LONGEST_SIDE;
 
 /// Longest side of a plane of which [`Choice::Auto`] takes as much as it can: that of the tiles that are cut from larger
 /// ones, so it costs the later stages no more than such a tile.

@@ -2,11 +2,11 @@
 
 use crate::error::Result;
 use crate::lattice::{Lattice, detect};
+use crate::method::components::leading;
+use crate::method::tile::Features;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::store::measurement::Measurement;
-use crate::texel::components::leading;
-use crate::texel::tile::Features;
 
 /// Views by which seams are judged.
 const FEATURE_VIEWS: usize = 6;

@@ -12,16 +12,16 @@ pub(crate) use features::features;
 
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
+use crate::method::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use crate::run::Context;
+use crate::run::Existing;
 use crate::run::recipe::METHOD;
 use crate::shape::Size;
 use crate::stage::cluster::{expect_measurement, measurement_name};
 use crate::store::measurement::Measurement;
+pub use crate::store::model::tile::TileReport as Report;
 use crate::store::model::{Model, Stage};
 use crate::store::origin;
-use crate::store::output::Existing;
-pub use crate::store::tile_report::TileReport as Report;
-use crate::texel::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use features::lattice_of;
 
 /// Memory of a texel of the plane: its codes under some directions, their components, and the transforms in which a

@@ -9,8 +9,8 @@ use crate::run::{Context, units};
 use crate::shape::{Size, Window};
 use crate::stage::image::model_of;
 use crate::store::enlarged::{Enlarged, KIND, SHARD_SIDE};
-use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::Stage;
+use crate::zarr::metadata::OLDEST_FORMAT;
 
 /// Memory that a shard takes while it is looked at.
 const SHARD_BYTES: u64 = (SHARD_SIDE * SHARD_SIDE * 40) as u64;

@@ -11,10 +11,10 @@ use crate::error::{Error, Kind, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::Window;
-use crate::store::gather::{self, Images};
+use crate::store::measurement::gather::{self, Images};
 use crate::store::measurement::{Measurement, SampleArray};
-use crate::store::metadata::OLDEST_FORMAT;
 use crate::words::counted;
+use crate::zarr::metadata::OLDEST_FORMAT;
 
 /// What was found.
 #[derive(Clone, Debug, Default, Serialize)]

@@ -16,7 +16,8 @@ use crate::run::Context;
 use crate::stage::deepzoom;
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
-use crate::store::{Store, enlarged as index, measurement as measured, model as modelled, recognise};
+use crate::store::{enlarged as index, measurement as measured, model as modelled, recognise};
+use crate::zarr::Store;
 
 /// What the oldest layout leaves open.
 pub(super) const OLDEST_NOTE: &str = "made by an older version: without seals and checksums, changed attributes and exchanged chunks cannot be told";

@@ -7,9 +7,9 @@ use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::stage::{cluster, normals};
-use crate::store::metadata::OLDEST_FORMAT;
 use crate::store::model::{KIND, Model, Stage};
 use crate::words::counted;
+use crate::zarr::metadata::OLDEST_FORMAT;
 
 /// Reads all of a model.
 pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {

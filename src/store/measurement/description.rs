@@ -5,7 +5,7 @@ use crate::color::{Decoder, LightnessCodes, Transfer};
 use crate::error::Result;
 use crate::kernel::predict::Shape;
 use crate::shape::Size;
-use crate::store::codec::Chunk;
+use crate::zarr::codec::Chunk;
 use btfkit_formats::{Direction, SampleType};
 
 /// Most bytes of samples in one shard.

@@ -7,9 +7,9 @@ use serde_json::{Map, Value};
 use super::Description;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::store::codec::MOST_CHANNELS;
-use crate::store::metadata::shown;
-use crate::store::{SAMPLE_TYPES, Store};
+use crate::zarr::codec::MOST_CHANNELS;
+use crate::zarr::metadata::shown;
+use crate::zarr::{SAMPLE_TYPES, Store};
 
 /// Attributes of the root, as far as they are needed; the seal covers them all.
 #[derive(Deserialize)]

@@ -11,21 +11,24 @@
 
 mod description;
 mod facts;
+pub mod gather;
 mod read;
 mod write;
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{SampleType, Samples};
+use btfkit_formats::SampleType;
 use serde_json::{Map, Value, json};
 
+use crate::disk::lock::Lock;
+use crate::disk::temporary;
 use crate::error::{Error, Result};
 use crate::run::{Context, recipe};
 use crate::shape::{Size, Window};
-use crate::store::checksums::DIGITS;
-use crate::store::codec::{Chain, chunk_codecs};
-use crate::store::{Array, Layout, Lock, Named, Store, directions, mapped};
-use crate::views::Views;
+use crate::store::directions;
+use crate::zarr::checksums::DIGITS;
+use crate::zarr::codec::{Chain, chunk_codecs};
+use crate::zarr::{Array, Layout, Named, Store};
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
 use facts::Facts;
@@ -330,20 +333,10 @@ fn holds_what_is_no_file(folder: &Path, depth: usize) -> bool {
     std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| {
         let path = entry.path();
         match depth {
-            0 | 1 => !mapped::is_temporary(&path) && !path.is_file(),
+            0 | 1 => !temporary::is_temporary(&path) && !path.is_file(),
             _ => path.is_dir() && holds_what_is_no_file(&path, depth - 1),
         }
     })
-}
-
-impl Views for Measurement {
-    fn description(&self) -> &Description {
-        &self.description
-    }
-
-    fn read_view(&self, view: usize, window: Window) -> Result<Samples> {
-        self.read_reflectance(view, window)
-    }
 }
 
 /// The two arrays of samples.
@@ -377,7 +370,7 @@ pub struct Origin<'a> {
 
 fn reflectance_layout(description: &Description, codec: Chain, side: usize) -> Result<Layout<'static>> {
     let mut layout = sample_layout(description, &REFLECTANCE_AXES, description.n_channels(), side);
-    layout.data_type = crate::store::data_type_of(description.sample_type);
+    layout.data_type = crate::zarr::data_type_of(description.sample_type);
     layout.attributes.insert("channels".to_owned(), json!(description.channels));
     let one = match description.sample_type {
         SampleType::U8 => "255 = 1",
@@ -433,10 +426,12 @@ fn sample_layout<'a>(
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use super::gather::{Images, images_of_texels};
+    use btfkit_formats::Samples;
+
     use super::*;
     use crate::color::{LightnessCodes, Transfer};
     use crate::random::Hash;
-    use crate::store::gather::{Images, images_of_texels};
     use btfkit_formats::Direction;
     use btfkit_formats::f16;
 

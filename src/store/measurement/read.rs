@@ -9,11 +9,11 @@ use btfkit_formats::{SampleType, Samples, f16};
 use rayon::prelude::*;
 
 use super::{CHUNK_SIDE, Measurement, SampleArray};
+use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
-use crate::store::codec::{Chunk, ChunkCodec};
-use crate::store::mapped::MappedFile;
-use crate::store::{DAMAGED, Store, shard};
+use crate::zarr::codec::{Chunk, ChunkCodec};
+use crate::zarr::{DAMAGED, Store, shard};
 
 /// A shard, and where its chunks lie in it.
 struct Shard {

@@ -3,13 +3,13 @@
 use btfkit_formats::Samples;
 use rayon::prelude::*;
 
+use super::gather::{self, Images};
 use super::{CHUNK_SIDE, Description, Measurement};
 use crate::color::{LightnessCodes, Remarkable};
 use crate::error::Result;
 use crate::shape::{Size, Window};
-use crate::store::codec::{Chain, ChunkCodec};
-use crate::store::gather::{self, Images};
-use crate::store::shard;
+use crate::zarr::codec::{Chain, ChunkCodec};
+use crate::zarr::shard;
 
 /// A chunk of both arrays, encoded, and what was found in it.
 type Encoded = (Vec<u8>, Vec<u8>, Remarkable);

@@ -1,0 +1,4 @@
+//! BTF values of clusters, under any view and light.
+
+pub mod evaluate;
+pub mod triangulation;

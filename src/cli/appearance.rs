@@ -13,7 +13,7 @@ use super::Tell;
 /// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
 const FEW_CELLS: u64 = 4;
 
-/// Describe how a model's exemplar looks, for `btf enlarge`
+/// Prepare a model for `btf enlarge`: how the surroundings of each texel look
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -25,7 +25,7 @@ pub(super) struct Appearance {
     /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     lattice: LatticeChoice,
-    /// Only print what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
 }

@@ -1,7 +1,7 @@
 //! Amounts of bytes, from text and for people.
 
-/// Bytes from text such as 512MiB, 1.5GiB, 2GB, 2G or 1000000: units with an `i`, and a letter alone, are powers of 1024,
-/// `kB`, `MB`, `GB` and `TB` powers of 1000.
+/// Bytes from text such as 512MiB, 1.5GiB, 2GB, 2G or 1000000: units with an `i`, and a letter alone, are powers of
+/// 1024, `kB`, `MB`, `GB` and `TB` powers of 1000.
 ///
 /// # Errors
 /// What was expected.

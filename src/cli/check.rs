@@ -16,28 +16,28 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, as_json};
 
-/// Examine a measurement: swapped or mirrored directions, wrong curves, images black, double or misplaced
+/// Find faults in a measurement: swapped or mirrored directions, wrong curves, black, duplicate or misplaced images
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf check wood.zarr
   btf check UBO_WOOD256.zip --picture wood.png
-  btf check felt.btf --azimuth mirrored             does that repair it?
-  btf check archives/*                              a line each, and a count
-Exits with 65 if there is a fault. docs/how-to/check.md explains every check.")]
+  btf check felt.btf --azimuth mirrored             does this option repair it?
+  btf check archives/*                              one line each, and a count
+The exit code is 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
-    /// Measurements and archives; of several each has a line
+    /// Measurements and archives; with several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// The archives are pieces of one measurement
+    /// Take the archives for pieces of one measurement
     #[arg(long)]
     pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
-    /// Write a sheet of what was measured: .png, .jpg, .webp or .tif
+    /// Also draw what was measured on one sheet: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Tell all as JSON
+    /// Print everything as JSON
     #[arg(long)]
     json: bool,
 }

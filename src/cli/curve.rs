@@ -12,7 +12,7 @@ use clap::Args;
 use super::table::{row, table};
 use super::{Tell, bytes_text};
 
-/// Show what error each number of clusters leaves and what compression it gives
+/// Show the error and the compression for each number of clusters
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -20,7 +20,7 @@ Examples:
   btf curve wood.zarr wood.model.zarr --most 256 --out curve.png
   btf curve wood.zarr wood.model.zarr --json > curve.json
 For 1, 2, 4 ... clusters: the weighted mean |dL*| of texels from their centres, the bytes of representatives and index,
-and how many times smaller they are than the raw measurement. Of a tile that 192 MiB do not hold, a sample is
+and how many times smaller they are than the raw measurement. Of a tile that does not fit in 192 MiB, a sample is
 clustered. The model stays as it is; choose a number, then run btf cluster --clusters N.")]
 pub(super) struct Curve {
     /// The measurement

@@ -18,7 +18,7 @@ const QUALITY: u8 = 90;
 #[derive(Args)]
 #[command(next_help_heading = "Deep Zoom")]
 pub(super) struct Deepzoom {
-    /// A picture as a pyramid of tiles: NAME.dzi, NAME_files, and a viewer NAME.html
+    /// Write a picture as a pyramid of tiles: NAME.dzi, NAME_files, and a viewer NAME.html
     #[arg(long)]
     deepzoom: bool,
     #[command(flatten)]
@@ -26,16 +26,16 @@ pub(super) struct Deepzoom {
     /// Format of the tiles
     #[arg(long, value_enum, default_value = "png")]
     format: TileFormat,
-    /// Side of a tile without its overlap
+    /// Side of a tile in pixels, without its overlap
     #[arg(long, default_value_t = 254, value_name = "PIXELS")]
     tile_size: usize,
-    /// Pixels of its neighbours that a tile holds
+    /// Pixels by which neighbouring tiles overlap
     #[arg(long, default_value_t = 1, value_name = "PIXELS")]
     overlap: usize,
-    /// Only say what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
-    /// Tell what was done as JSON
+    /// Print what was done as JSON
     #[arg(long)]
     json: bool,
 }

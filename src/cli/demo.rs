@@ -9,7 +9,7 @@ use super::Tell;
 use super::sample::Material;
 use super::table::{row, table};
 
-/// The whole method on a made material: sample, import, model, enlarge, pictures and a page
+/// Run the whole method on a synthetic material, and make a page of pictures
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -17,7 +17,7 @@ Examples:
   btf demo wood-demo --material wood
 Takes about a minute and 1 GB of disk. Interrupted, the same command goes on.")]
 pub(super) struct Demo {
-    /// Folder for everything that is made
+    /// Folder for all results
     #[arg(default_value = "demo")]
     folder: PathBuf,
     /// Which material

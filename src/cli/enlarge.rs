@@ -21,7 +21,7 @@ const TILES: usize = 4;
 /// The most outputs that one command makes.
 const MOST_SEEDS: u64 = 1 << 16;
 
-/// Model to enlarged index of any size
+/// Enlarge a model's tile to a texture of any size
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -30,18 +30,18 @@ Examples:
   btf enlarge wood.model.zarr wood.zarr --size 2048x2048 --seed 1..8     makes wood-1.zarr to wood-8.zarr
   btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      joins at its own borders
   btf enlarge wood.model.zarr huge.zarr --size 65536x65536 --shard 3/8   one of eight jobs that share the work
-  btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of Filip and Haindl 2007
+  btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of the paper
   btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    their second baseline
   btf enlarge wood.model.zarr quilt.zarr --size 1024x1024 --method quilt image quilting
   btf enlarge models/*.model.zarr --into planes --size 2048x2048         many models, wood.enlarged.zarr and so on
 The same model, method, size and seed give the same bytes, whatever the memory, the threads, the shards and the
 interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
-    /// The model, and the enlarged index to make [default: the model's name with .enlarged.zarr]; or many models. With
-    /// several seeds each output has its number in its name
+    /// The model, and the enlargement to make [default: the model's name with .enlarged.zarr]; or many models. With
+    /// several seeds, each output has its seed in its name
     #[arg(required = true, value_name = "MODEL")]
     paths: Vec<PathBuf>,
-    /// Folder for the outputs; every name is a model [default: beside each]
+    /// Make one enlargement for each model, in this folder [default: beside each model]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     /// Size of the output in texels, WIDTHxHEIGHT, each from 1 to 16777216
@@ -50,23 +50,23 @@ pub(super) struct Enlarge {
     /// How to enlarge
     #[arg(long, value_enum, default_value = "coherent")]
     method: Method,
-    /// Seed of all that is drawn at random: another seed gives another piece of the same material. FIRST..LAST makes
+    /// Seed of everything random: another seed gives another piece of the same material. FIRST..LAST makes
     /// one output for each, the last included
     #[arg(long, default_value = "1", value_parser = seeds, allow_hyphen_values = true)]
     seed: RangeInclusive<u64>,
     /// Make an output that joins at its own borders (paper: nearly). Its sides must be multiples of a power of two
-    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); sizes that are not are
-    /// refused, with the nearest that are
+    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); sizes that are not
+    /// are refused, with the nearest that are
     #[arg(long)]
     tileable: bool,
-    /// Make only part K of N of the output (not paper, not quilt): N jobs share the work, in any order
+    /// Make only part K of N (not for paper and quilt), so that N jobs share the work, in any order
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
-    /// How far pieces of the exemplar are moved against each other, from 0 to 1 (coherent): more repeats less, less fits
-    /// better [default: 0.5, and 0 where the material has a lattice]
+    /// How much pieces are shifted at random, from 0 to 1 (coherent): more repeats less, less fits better [default:
+    /// 0.5, and 0 where the material has a lattice]
     #[arg(long, value_parser = number::share)]
     jitter: Option<f64>,
-    /// Do not write which texel of the tile each texel is (all but paper)
+    /// Do not store which texel of the tile each texel is (all but paper)
     #[arg(long)]
     no_source: bool,
     /// Write normals beside the index: the tile's, or the synthesised ones (paper)
@@ -78,27 +78,27 @@ pub(super) struct Enlarge {
     /// Number of nearest normals among which one is chosen (paper) [default: 16, or all of a smaller tile]
     #[arg(long)]
     candidates: Option<usize>,
-    /// Rows in work at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
+    /// Rows computed at a time (paper); affects memory, not the result [default: as many as fit 2 MiB]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     band: Option<u32>,
-    /// Only print what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
-    /// Pieces of the exemplar that continue each other: keeps structure
+    /// Pieces of the tile that continue each other; keeps structure
     Coherent,
-    /// Nearest normals of a random field: Filip and Haindl 2007
+    /// The method of Filip and Haindl 2007: nearest normals of a random field
     Paper,
     /// The tile again and again, whatever the seed
     Repeat,
-    /// Some tiles of one border and different insides, laid at random: all join each other
+    /// Several tiles with one common border, laid at random
     Tiles,
-    /// Patches from random places of the tile on a grid, stitched along minimum-error paths
+    /// Patches from random places of the tile on a grid, joined along minimum-error paths
     Roller,
-    /// Blocks chosen to fit those before, stitched along minimum-error paths: Efros and Freeman 2001
+    /// Image quilting (Efros and Freeman 2001): blocks that fit their neighbours, joined along minimum-error paths
     Quilt,
 }
 

@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use super::deepzoom::Deepzoom;
 use super::{Tell, bytes_text, found};
 
-/// Measurement to archive (UBO2003 zip, EXR or PNG folder, HDF5, npy, Bonn DFMF or FMF), picture to Deep Zoom tiles
+/// Write a measurement as an archive (zip, EXR, PNG, HDF5, npy, Bonn), or a picture as Deep Zoom tiles
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -21,20 +21,19 @@ Examples:
   btf export wood-4k.zarr wood.dzi --deepzoom --light 60,90 --format jpeg
                                                       tiles for OpenSeadragon and others, and wood.html to look at them
 Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.
-A pyramid of tiles is made of measurements, models and enlarged indices of any size, as `btf image` shows them; interrupted, the same
-command goes on.")]
+Tiles show measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the same command again.")]
 pub(super) struct Export {
-    /// A measurement; for --deepzoom a model or an enlarged index too
+    /// The measurement; with --deepzoom also a model or an enlargement
     store: PathBuf,
     /// The file or folder to make
     output: PathBuf,
     /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF, .dzi Deep Zoom]
     #[arg(long, value_enum, conflicts_with = "deepzoom")]
     to: Option<FormatName>,
-    /// Components of a factorised container [default: all]
+    /// Components to keep in a Bonn container [default: all, which is exact]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     rank: Option<u32>,
-    /// JPEG quality [default: 100, of tiles 90]
+    /// JPEG quality [default: 100, for tiles 90]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
     #[command(flatten)]

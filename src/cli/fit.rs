@@ -15,7 +15,7 @@ use clap::{Args, ValueEnum};
 use super::Tell;
 use super::table::{row, table};
 
-/// Fit the random field to a model's normal map
+/// Fit a random field to a model's normal map, for `btf enlarge --method paper`
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,30 +29,30 @@ pub(super) struct Fit {
     model: PathBuf,
     #[command(flatten)]
     options: FitOptions,
-    /// Write how like the tile a synthesis is, as NAME.txt and NAME.png
+    /// Compare a synthesis with the tile, and write the result to NAME.txt and NAME.png
     #[arg(long, value_name = "NAME")]
     report: Option<PathBuf>,
-    /// Only say what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
 }
 
 #[derive(Args)]
 pub(super) struct FitOptions {
-    /// Random field: all channels together, or one by one after the Karhunen-Loeve transform
+    /// Random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
     #[arg(long, value_enum, default_value = "3d")]
     mrf: Kind,
     /// Levels of the pyramid [default: 1 to 5, whichever keeps the autocovariance best]
     #[arg(long)]
     levels: Option<usize>,
-    /// What is modelled: the three components of the normals, or two slopes
+    /// What to model: the three components of the normals, or two slopes
     #[arg(long, value_enum, default_value = "normals")]
     field: Field,
-    /// How loud each level is: so that their sum has the statistics of the tile, or as estimated
+    /// Variance of each level: matched, so that the sum of all levels has that of the tile; or none, as estimated
     #[arg(long, value_enum, default_value = "matched")]
     gains: Gains,
-    /// What a synthesis takes over of the tile's distribution of normals: that of n_x and n_y together, of each, or
-    /// nothing, as in the paper
+    /// Which distribution of the tile's normals a synthesis keeps: the joint one of n_x and n_y, that of each, or none,
+    /// as in the paper
     #[arg(long, value_enum, default_value = "joint")]
     marginals: Marginals,
 }

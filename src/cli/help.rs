@@ -102,7 +102,7 @@ fn groups(command: &Command) -> String {
     text
 }
 
-/// Print what completes commands and options in a shell
+/// Print completions of commands and options for a shell
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -126,7 +126,7 @@ impl Completions {
     }
 }
 
-/// Manual pages: one for the program, one for each command
+/// Print a manual page, or write all of them into a folder
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

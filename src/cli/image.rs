@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use super::scene::SceneArgs;
 use super::{Tell, found};
 
-/// Picture of a measurement, a model's tile or an enlarged index
+/// Write a picture of a measurement, a model's tile or an enlargement
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -19,11 +19,11 @@ Examples:
   btf image wood.model.zarr --what normals --out normals.png
   btf image wood.zarr --out wood.jpg --quality 95
   btf image --plane wood.model.zarr --window -500,12345,512,512 --out piece.png
-                                                                        a part of an endless plane that is not stored
+                                                                      a part of a model's endless plane
 A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
 from the three views and three lights around them.")]
 pub(super) struct Image {
-    /// A measurement, a model or an enlarged index
+    /// A measurement, a model or an enlargement
     source: PathBuf,
     /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has
     /// at most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory

@@ -15,36 +15,36 @@ use super::outputs::wanted_twice;
 use super::source::SourceArgs;
 use super::{Tell, bytes_text, number};
 
-/// Archive to measurement: any of the formats that `btf info` knows, one archive or hundreds
+/// Convert archives into measurements, from any format that `btf info` lists; one archive or hundreds
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf import UBO_WOOD256.zip                      makes UBO_WOOD256.zarr here
   btf import MANYFILES/ wood.zarr --threads 2     a folder of images, or of zips
-  btf import tv*.zip wood.zarr                    one measurement in many pieces: the store is named last
-  btf import *.zip *.btf --into stores            many archives, a store each; a bad one does not stop the others
-  btf import felt.btf --shard 3/8                 the fourth of eight parts of the views, for a job array
+  btf import tv*.zip wood.zarr                    one measurement in many pieces; the store comes last
+  btf import *.zip *.btf --into stores            many archives, one store each; a bad one does not stop the others
+  btf import felt.btf --shard 3/8                 the fourth of eight parts, for an array of jobs
   btf import wall.btf --codec predictive          a tenth to a fifth smaller; zarr-python needs our module to read it
-Interrupted, the same command goes on with the views that are missing.")]
+If it is interrupted, run the same command again: it goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives; the last name is the store to make if it ends in .zarr, unless --into is given
+    /// Archives, and last the measurement to make, if that name ends in .zarr and --into is not given
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
-    /// Folder for the stores, one for each name: all names are archives [default: here]
+    /// Make one measurement for each archive, in this folder [default: the current folder]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArgs,
-    /// Reflectance that counts as L* = 100
+    /// Reflectance that counts as white, L* = 100
     #[arg(long, default_value_t = 1.0, value_parser = number::white)]
     white: f64,
-    /// How samples are packed: `stock` opens with zarr-python as it is, `predictive` is smaller and faster
+    /// How to pack samples: `stock` opens in zarr-python as it is, `predictive` is smaller and faster
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
     codec: Chain,
     /// Import part K of N of the views (K from 0)
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
-    /// Only say what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
 }

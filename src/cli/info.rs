@@ -19,10 +19,10 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, as_json, bytes_text};
 
-/// Tell what an archive or a store holds, how far it is, and how large the store of an archive will be
+/// Show what an archive or a store holds, and how large the store of an archive will be
 #[derive(Args)]
 #[command(after_help = "\
-Archives are told apart by their content:
+Archives are recognised by their content:
   zips and folders of pictures (JPEG, PNG, TIFF, Radiance, OpenEXR) with angles in their names, a table or an .lp list;
   Bonn .btf (DFMF, FMF, PVF, BDI); MLVQ databases; UTIA BIG and MIF; numpy arrays; HDF5.
 
@@ -31,17 +31,17 @@ Examples:
   btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
   btf info wood.zarr
   btf info wood.model.zarr --json
-  btf info archives/*                               a line each, and a count")]
+  btf info archives/*                               one line each, and a count")]
 pub(super) struct Info {
-    /// Archives and stores; of several each has a line
+    /// Archives and stores; with several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// The archives are pieces of one measurement
+    /// Take the archives for pieces of one measurement
     #[arg(long)]
     pieces: bool,
     #[command(flatten)]
     source: SourceArgs,
-    /// Tell it as JSON
+    /// Print it as JSON
     #[arg(long)]
     json: bool,
 }

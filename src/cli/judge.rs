@@ -14,29 +14,29 @@ use clap::Args;
 use super::Tell;
 use super::table::{row, table};
 
-/// How far is an enlargement from real crops of the material, in units of how far those are from each other?
+/// Rate an enlargement beside real crops of the material: 1 is as near as another real crop
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf judge wood-4k.zarr --against wood.zarr
   btf judge wood-4k.zarr --against wood.zarr --sheet judged.png --json judged.json
-  btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless plane, not stored
+  btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of a model's endless plane
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
 J is the worst of five measures; 1 is as good as another real crop. docs/how-to/judge.md says what each measure sees.")]
 pub(super) struct Judge {
-    /// An enlarged index, or a model with --size
+    /// An enlargement, or a model with --size
     subject: PathBuf,
     /// The measurement that the model was made of
     #[arg(long, value_name = "MEASUREMENT")]
     against: PathBuf,
-    /// The model of an enlarged index [default: where it lay, or of that name beside the index or in the current
-    /// folder]
+    /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
+    /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Of a model: how much of its endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
+    /// How much of a model's endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
     #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Numbers of a view and a light, from 0; may be given several times [default: five pairs spread over the
+    /// Numbers of a view and a light, from 0; repeat the option for more [default: five pairs spread over the
     /// directions]
     #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,

@@ -1,9 +1,10 @@
 //! What was asked for: arguments in, stages run, results told, errors turned into exit codes.
 
-mod analyse;
 mod appearance;
 mod bytes;
 mod check;
+mod cluster;
+mod compare;
 mod curve;
 mod deepzoom;
 mod demo;
@@ -16,6 +17,8 @@ mod image;
 mod import;
 mod info;
 mod judge;
+mod model;
+mod normals;
 mod number;
 mod outputs;
 mod progress;
@@ -48,14 +51,14 @@ use serde_json::Value;
 
 const EXAMPLES: &str = "\
 Examples:
-  btf demo                                      the whole method on a made material, with a page of pictures
-  btf import UBO_WOOD256.zip wood.zarr          archive to measurement
-  btf model wood.zarr wood.model.zarr           measurement to model: tile, clusters, normals, random field
+  btf demo                                      the whole method on a synthetic material, with pictures
+  btf import UBO_WOOD256.zip wood.zarr          an archive becomes a measurement
+  btf model wood.zarr wood.model.zarr           a measurement becomes a model
   btf enlarge wood.model.zarr big.zarr --size 4096x4096
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
-Each command explains itself: btf import --help, or man btf-import (see btf man --help).
+Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or another recipe, 66 input not there yet,
+Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or a result of other options, 66 input not there yet,
 74 input/output, 75 stopped early (run the same command again).";
 
 /// Why something could not be written to standard output: the program must not end as if it had been told.
@@ -66,7 +69,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"
 /// More threads than any machine has cores that share a memory.
 const MOST_THREADS: i64 = 1024;
 
-/// Turns a measured Bidirectional Texture Function into a small model that covers any surface.
+/// Turns a measured BTF (bidirectional texture function) into a small model, and a model into textures of any size.
 #[derive(Parser)]
 #[command(name = "btf", version = VERSION, after_help = EXAMPLES, subcommand_help_heading = "Commands")]
 struct Cli {
@@ -87,14 +90,14 @@ struct Common {
     #[arg(long, global = true, default_value = "2GiB", value_parser = bytes::parse_bytes, value_name = "SIZE")]
     #[arg(allow_hyphen_values = true)]
     memory: u64,
-    /// How to tell progress
+    /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace files that are where results are to be, and make anew what another recipe made there. Without it nothing
-    /// that exists is ever replaced
+    /// Replace results that exist, and redo what was made with other options. Without it, nothing that exists is ever
+    /// replaced
     #[arg(long, global = true)]
     force: bool,
-    /// Say nothing but errors
+    /// Print nothing but errors
     #[arg(long, short, global = true)]
     quiet: bool,
 }
@@ -103,7 +106,7 @@ struct Common {
 enum ProgressStyle {
     /// Bars on a terminal, nothing elsewhere.
     Auto,
-    /// A JSON object a line on standard error, for schedulers; errors too.
+    /// One JSON object a line on standard error, for schedulers; errors too.
     Json,
     /// Nothing.
     None,
@@ -118,14 +121,14 @@ enum Command {
     Import(import::Import),
     Verify(verify::Verify),
     Export(export::Export),
-    Model(analyse::Whole),
+    Model(model::Model),
     Tile(tile::Tile),
-    Cluster(analyse::Cluster),
+    Cluster(cluster::Cluster),
     Curve(curve::Curve),
-    Normals(analyse::Normals),
+    Normals(normals::Normals),
     Fit(fit::Fit),
     Appearance(appearance::Appearance),
-    Compare(analyse::Compare),
+    Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
     Judge(judge::Judge),

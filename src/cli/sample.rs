@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 
 use super::{Tell, bytes_text, found, number};
 
-/// Make a synthetic measurement in UBO2003's layout
+/// Make a synthetic measurement: a zip of pictures named like those of UBO2003
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -23,10 +23,10 @@ pub(super) struct Sample {
     /// Which material
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
-    /// Size of its images, WIDTHxHEIGHT, each from 1 to 65536
+    /// Size of the images, WIDTHxHEIGHT, each from 1 to 65536
     #[arg(long, default_value = "128x128", allow_hyphen_values = true, value_parser = size)]
     size: Size,
-    /// Number of views; 81 are those of UBO2003
+    /// Number of views; 81 gives the directions of UBO2003
     #[arg(long, default_value_t = 81)]
     views: usize,
     /// Number of lights
@@ -35,7 +35,7 @@ pub(super) struct Sample {
     /// Seed of the material
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Size of its features relative to the default
+    /// Size of the features relative to the default
     #[arg(long, default_value_t = 1.0, value_parser = number::scale)]
     scale: f64,
 }

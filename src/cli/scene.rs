@@ -20,22 +20,22 @@ pub(super) struct SceneArgs {
     /// Part to show: x,y,width,height in texels, x and y of its top left corner
     #[arg(long, allow_hyphen_values = true)]
     window: Option<Area>,
-    /// Factor on the linear values, above 0
+    /// Brightness: a factor on the linear values, above 0
     #[arg(long, default_value_t = 1.0, value_parser = number::exposure)]
     pub(super) exposure: f64,
     /// Values of the texels: those of the model's clusters, or those measured where each texel comes from
     /// [default: model]
     #[arg(long, value_enum)]
     values: Option<ValuesName>,
-    /// The measurement; implies --values measured [default: where it lay when the model was made; beside the
-    /// model or in the current folder, without .model in its name]
+    /// The measurement; implies --values measured [default: where it was when the model was made; else beside
+    /// the model or in the current folder, without .model in its name]
     #[arg(long)]
     measurement: Option<PathBuf>,
-    /// The model of an enlarged index [default: where it lay, or of that name beside the index or in the current
-    /// folder]
+    /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
+    /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Of a model: a part of its endless plane, made at once and not stored; --window says which, negative x and y too
+    /// Show a part of a model's endless plane, without storing it; --window says which part, also at negative x and y
     #[arg(long)]
     plane: bool,
     /// Seed of the plane

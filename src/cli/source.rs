@@ -21,16 +21,16 @@ pub(super) struct SourceArgs {
     /// Convert samples to this type [default: as they are]
     #[arg(long, value_enum)]
     samples: Option<SampleName>,
-    /// Azimuths run clockwise
+    /// Which azimuths of the archive run clockwise
     #[arg(long, value_enum)]
     azimuth: Option<Azimuth>,
-    /// Turn all directions counter-clockwise
+    /// Turn all directions counter-clockwise by so many degrees
     #[arg(long, value_parser = ["90", "180", "270"])]
     turn: Option<String>,
-    /// Rows and columns of the images are exchanged
+    /// Exchange rows and columns of the images
     #[arg(long)]
     transpose: bool,
-    /// What the archive calls light is the view, and the other way round
+    /// Exchange light and view: the archive has them the wrong way round
     #[arg(long)]
     swap: bool,
     /// `excluded`: the cosine of the light angle is not in the values, so multiply it in
@@ -51,7 +51,7 @@ pub(super) struct SourceArgs {
     /// `atrium`: scan lines of Radiance pictures that name X first are rows, from the bottom up
     #[arg(long, value_parser = ["rules", "atrium"])]
     hdr: Option<String>,
-    /// Leave out a view, by its number in the archive; may be given several times
+    /// Leave out a view, by its number in the archive; repeat the option for more
     #[arg(long, value_name = "N")]
     drop_view: Vec<usize>,
 }

@@ -8,8 +8,8 @@ const GAP: usize = 2;
 /// The narrowest column that prose is wrapped in.
 const LEAST_PROSE: usize = 16;
 
-/// Columns as wide as their widest cell: numbers flush right, prose flush left. On a terminal the widest column of prose
-/// is wrapped where the table would be too wide.
+/// Columns as wide as their widest cell: numbers flush right, prose flush left. On a terminal the widest column of
+/// prose is wrapped where the table would be too wide.
 pub(super) fn table(rows: &[Vec<String>]) -> String {
     laid_out(rows, of_output())
 }

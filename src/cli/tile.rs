@@ -13,9 +13,10 @@ const LITTLE: f64 = 0.5;
 
 #[derive(Args)]
 pub(super) struct TileOptions {
-    /// What to take as the tile: auto (largest up to 256 texels a side, else cut), largest (all if its borders join, else
-    /// the largest seamless part), cut (the part whose seams show least), WIDTHxHEIGHT (a seamless part), plane (all),
-    /// none (all, borders do not join), periodic (all, they do)
+    /// What to take as the tile. auto: as largest, up to 256 texels a side, else as cut; largest: everything if the
+    /// borders join, else the largest seamless part; cut: the part whose seams show least; WIDTHxHEIGHT: a seamless
+    /// part of that size; plane: everything; none: everything, with borders that do not join; periodic: everything,
+    /// with borders that do
     #[arg(long, default_value = "auto")]
     tile: tile::Choice,
     /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
@@ -25,12 +26,12 @@ pub(super) struct TileOptions {
 
 #[derive(Args)]
 pub(super) struct Seed {
-    /// Seed of all that is drawn at random
+    /// Seed of everything random
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
 }
 
-/// Take a tile from a measurement, whole or a part that joins at its borders; begins a model
+/// Begin a model: choose its tile, the whole measurement or a part whose borders join
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -45,7 +46,7 @@ pub(super) struct Tile {
     options: TileOptions,
     #[command(flatten)]
     seed: Seed,
-    /// Only say what would be done
+    /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
 }

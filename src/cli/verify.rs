@@ -12,28 +12,28 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Tell, as_json};
 
-/// Is a store or a pyramid whole and undamaged? Names what is not; --source compares a measurement with its archive
+/// Check that a store is whole and undamaged; with --source, compare a measurement with its archive
 #[derive(Args)]
 #[command(after_help = "\
-Everything is read: every chunk of every array, what the metadata must say, and what follows from what.
+Everything is read: every chunk of every array, and all metadata, which must agree with each other.
 
 Examples:
   btf verify wood.zarr
   btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
   btf verify wood.model.zarr
-  btf verify wood-4k.zarr                           with its model, if that lies beside it; else --model names it
+  btf verify wood-4k.zarr                           with its model, which lies beside it or is named by --model
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
-  btf verify stores/*.zarr                          a line each, and a count
-Exit code 65 if something is damaged or different, 66 if something is missing.")]
+  btf verify stores/*.zarr                          one line each, and a count
+The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
-    /// Measurements, models, enlarged indices and Deep Zoom pyramids (a .dzi, or the folder of its tiles); of several each
-    /// has a line
+    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); with several, each
+    /// gets one line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
-    /// The model of an enlarged index [default: where it lay when the index was made, or beside it]
+    /// The model of an enlargement [default: where it was when the enlargement was made, or beside it]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// The archive that it was made of; may be given several times for one in pieces
+    /// The archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
     #[command(flatten)]

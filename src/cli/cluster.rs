@@ -1,0 +1,253 @@
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use btfkit::error::Result;
+use btfkit::method::cluster::centre::CentreRule;
+use btfkit::method::cluster::lloyd::Limits;
+use btfkit::run::Context;
+use btfkit::stage::cluster::{self, Amount, First, Step, Stepped};
+use btfkit::stage::import::Shard;
+use btfkit::words::counted;
+use clap::{Args, ValueEnum};
+
+use super::tile::Seed;
+use super::{Tell, bytes_text, number};
+
+#[derive(Args)]
+pub(super) struct ClusterOptions {
+    /// Number of clusters, n_c [default: 256, or as many as the tile has texels]
+    #[arg(long, group = "amount", value_parser = number::count)]
+    clusters: Option<usize>,
+    /// Instead: the fewest clusters with a mean weighted |dL*| of at most this
+    #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
+    error: Option<f64>,
+    /// Instead: as many as make the model this many times smaller than the raw measurement
+    #[arg(long, group = "amount", value_name = "N", value_parser = number::positive)]
+    ratio: Option<f64>,
+    /// Centre of a cluster
+    #[arg(long, value_enum, default_value = "median")]
+    centre: Centre,
+    /// Most passes over the texels
+    #[arg(long, default_value_t = Limits::default().passes)]
+    passes: usize,
+    /// Stop when a pass improves the objective by less than this share
+    #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
+    tolerance: f64,
+    /// How to find the first centres [default: from all texels if they fit in 192 MiB, else sample]
+    #[arg(long, value_enum)]
+    first: Option<FirstName>,
+    /// Texels in the sample [default: as many as fit in 192 MiB; for mini-batches 16384, or eight for each cluster]
+    #[arg(long, value_name = "TEXELS")]
+    sample: Option<usize>,
+    /// Try so many sets of first centres, and go on with the best
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    restarts: u32,
+    /// Begin no further pass after so many seconds
+    #[arg(long, value_name = "SECONDS")]
+    time: Option<u64>,
+    /// Take the clusters of another model of this measurement, whose tile contains this one
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "first", "sample", "restarts", "time"])]
+    clusters_of: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Centre {
+    /// The median in each direction, with the least sum of absolute differences
+    Median,
+    /// The mean, as in ordinary k-means
+    Mean,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FirstName {
+    /// Cluster a random sample of the texels in memory
+    Sample,
+    /// Pass over mini-batches drawn from the whole store, each twice as large as the one before
+    Minibatch,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum StepName {
+    /// Find the first centres: one process
+    Prepare,
+    /// Assign a share of the texels to their centres: many processes
+    Assign,
+    /// Finish a pass: one process
+    Reduce,
+}
+
+/// Group the texels of a model's tile into clusters whose BRDFs are alike
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf cluster wood.zarr wood.model.zarr --clusters 400
+  btf cluster wood.zarr wood.model.zarr --error 1.5         the fewest clusters with this mean |dL*|
+  btf cluster wood.zarr wood.model.zarr --ratio 200         a two hundredth of the measurement's size
+  btf cluster wood.zarr second.model.zarr --clusters-of wood.model.zarr
+Cluster the whole plane once, and use its clusters for any tile that is cut from it:
+  btf tile wood.zarr plane.model.zarr --tile none && btf cluster wood.zarr plane.model.zarr
+  btf model wood.zarr wood.model.zarr --clusters-of plane.model.zarr
+Many processes, the same bytes (exit code 66: a step before this one is not finished):
+  btf cluster wood.zarr plane.model.zarr --step prepare
+  btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
+  btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
+The reduce step that converges writes the model; further steps have nothing to do.
+Clusters are formed by lightness alone, so texels of different hues may share one. btf compare shows the difference
+in colour.")]
+pub(super) struct Cluster {
+    /// The measurement
+    measurement: PathBuf,
+    /// The model with the tile
+    model: PathBuf,
+    #[command(flatten)]
+    options: ClusterOptions,
+    #[command(flatten)]
+    seed: Seed,
+    /// Do only one step, where many processes share the work
+    #[arg(long, value_enum, conflicts_with_all = ["clusters_of", "time"])]
+    step: Option<StepName>,
+    /// Number of the pass, from 0; a pass that is finished is not done again [default: the latest]
+    #[arg(long, requires = "step", value_name = "N")]
+    pass: Option<usize>,
+    /// Assign only part K of N of the pass
+    #[arg(long, requires = "step", value_name = "K/N", default_value = "0/1")]
+    shard: Shard,
+    /// Print what would be done, and do nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl Cluster {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let Self { measurement, model, options, seed, .. } = self;
+        if self.dry_run {
+            return match &options.clusters_of {
+                Some(from) => tell.plan(&taken_plan(model, from)?.summary()),
+                None => tell.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
+            };
+        }
+        let Some(step) = self.step() else {
+            let (found, report) = run_clusters(measurement, model, options, seed.seed, context)?;
+            tell_clusters(&report, tell.found(found));
+            return Ok(());
+        };
+        match cluster_plan(measurement, model, options, seed.seed)?.step(step, context)? {
+            Stepped::Done(report) => tell_clusters(&report, tell),
+            Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
+            Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
+            Stepped::Assigned { pass, found, written } => {
+                tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
+            }
+        }
+        Ok(())
+    }
+
+    fn step(&self) -> Option<Step> {
+        Some(match self.step? {
+            StepName::Prepare => Step::Prepare,
+            StepName::Assign => Step::Assign(self.pass, self.shard),
+            StepName::Reduce => Step::Reduce(self.pass),
+        })
+    }
+}
+
+/// Clusters, or takes the clusters of another model; tells whether that was found done.
+pub(super) fn run_clusters(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+    context: &Context<'_>,
+) -> Result<(bool, cluster::Report)> {
+    match &options.clusters_of {
+        Some(from) => {
+            let plan = taken_plan(model, from)?;
+            Ok((plan.is_done(), plan.run(context)?))
+        }
+        None => {
+            let plan = cluster_plan(measurement, model, options, seed)?;
+            Ok((plan.is_done(), plan.run(context)?))
+        }
+    }
+}
+
+fn taken_plan(model: &Path, from: &Path) -> Result<cluster::TakenPlan> {
+    cluster::plan_taken(&cluster::TakenOptions { model: model.into(), from: from.into() })
+}
+
+fn cluster_plan(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+) -> Result<cluster::Plan> {
+    let centre = match options.centre {
+        Centre::Median => CentreRule::Median,
+        Centre::Mean => CentreRule::Mean,
+    };
+    let limits = Limits { passes: options.passes.max(1), tolerance: options.tolerance };
+    let amount = match (options.clusters, options.error, options.ratio) {
+        (_, Some(error), _) => Amount::Error(error),
+        (_, _, Some(ratio)) => Amount::Ratio(ratio),
+        (clusters, ..) => clusters.map_or(Amount::Usual, Amount::Clusters),
+    };
+    cluster::plan(&cluster::Options {
+        measurement: measurement.into(),
+        model: model.into(),
+        amount,
+        centre,
+        limits,
+        first: options.first.map(|first| match first {
+            FirstName::Sample => First::Sample,
+            FirstName::Minibatch => First::Minibatch,
+        }),
+        sample: options.sample,
+        restarts: options.restarts,
+        seed,
+        time: options.time.map(Duration::from_secs),
+    })
+}
+
+pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
+    let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
+    let taken = report.taken_from.as_ref();
+    let passes = match (report.batches.len(), report.passes.len()) {
+        (0, all) => format!("after {}", counted(all, "pass")),
+        (batches, all) => {
+            format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
+        }
+    };
+    let stored = report.representative_bytes + report.index_bytes;
+    let ratio = |bytes: u64| bytes as f64 / stored as f64;
+    if tell.brief {
+        let error = report.representative_lightness_error;
+        let ratio = ratio(report.measurement_bytes);
+        let text = format!(
+            "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
+            report.clusters
+        );
+        return tell.stage("clusters", &text);
+    }
+    let how = taken
+        .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
+    tell.stage(
+        "clusters",
+        &format!(
+            "{} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
+            report.clusters, report.representative_lightness_error
+        ),
+    );
+    tell.line(format!(
+        "          representatives {:.3} from their centres, at most {:.3}; {} of one texel",
+        report.representative_from_centre,
+        report.representative_from_centre_most,
+        counted(report.single_texel_clusters, "cluster")
+    ));
+    tell.line(format!(
+        "size      representatives {} + index {}: 1:{:.1} of the raw tile, 1:{:.0} of the raw measurement",
+        bytes_text(report.representative_bytes),
+        bytes_text(report.index_bytes),
+        ratio(report.tile_bytes),
+        ratio(report.measurement_bytes)
+    ));
+}

@@ -1,0 +1,109 @@
+use std::path::PathBuf;
+
+use btfkit::error::Result;
+use btfkit::run::{Context, progress};
+use btfkit::store::measurement;
+use btfkit::store::model::Stage;
+use btfkit::words::counted;
+use clap::Args;
+
+use super::Tell;
+use super::appearance::{appearance_plan, tell_appearance};
+use super::cluster::{ClusterOptions, run_clusters, tell_clusters};
+use super::each::{Ended, Line, each};
+use super::fit::{FitOptions, fit_plan, tell_field};
+use super::normals::{NormalsOptions, normals_plan, tell_normals};
+use super::outputs::{Naming, Pair};
+use super::tile::{Seed, TileOptions, tell_tile, tile_plan};
+
+/// Make a model of a measurement: tile, clusters, normals, random field and appearance in one go
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf model wood.zarr wood.model.zarr
+  btf model leather.zarr --clusters 128 --mrf 2d --tile 128x128
+  btf model cloth.zarr --lattice '15.2,0;0,18.4'
+  btf model stores/*.zarr --into models            one model each; a bad one does not stop the others
+Stages that are already done with the same options are not run again.")]
+pub(super) struct Model {
+    /// The measurement, and the model to make [default: the measurement's name with .model.zarr]; or many measurements
+    #[arg(required = true, value_name = "MEASUREMENT")]
+    paths: Vec<PathBuf>,
+    /// Make one model for each measurement, in this folder [default: beside each measurement]
+    #[arg(long, value_name = "DIR")]
+    into: Option<PathBuf>,
+    #[command(flatten)]
+    tile: TileOptions,
+    #[command(flatten)]
+    cluster: ClusterOptions,
+    #[command(flatten)]
+    normals: NormalsOptions,
+    #[command(flatten)]
+    fit: FitOptions,
+    #[command(flatten)]
+    seed: Seed,
+    /// Print what would be done first, and do nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl Model {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+        let naming = Naming { reads: measurement::KIND, ending: None, becomes: ".model.zarr" };
+        let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
+        if let [pair] = pairs.as_slice() {
+            return self.one(pair, context, tell).map(|_| Ended::Done);
+        }
+        let name = |pair: &Pair| pair.input.display().to_string();
+        each(&pairs, name, false, context, tell, |pair| {
+            let clusters = self.one(pair, context, if self.dry_run { tell } else { tell.silent() })?;
+            let clusters = clusters.map(|clusters| counted(clusters, "cluster"));
+            Ok((
+                Line::Text(format!(
+                    "{}: {}",
+                    pair.output.display(),
+                    clusters.unwrap_or("planned".to_owned())
+                )),
+                None,
+            ))
+        })
+    }
+
+    /// Makes one model; tells how many clusters it has, unless nothing but a plan was asked for.
+    fn one(&self, pair: &Pair, context: &Context<'_>, tell: Tell) -> Result<Option<usize>> {
+        let Pair { input: measurement, output: model } = pair;
+        let plan = tile_plan(measurement, model, &self.tile, self.seed.seed)?;
+        if self.dry_run {
+            return tell.plan(&plan.summary()).map(|()| None);
+        }
+        let begin = |stage: Stage| {
+            let number = 1 + Stage::ALL.iter().position(|&other| other == stage).unwrap_or(0);
+            let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
+            context.progress.stage(Some(stage));
+        };
+        // A line may be told only while no bar is drawn.
+        let tell = tell.brief();
+        let told = |found: bool, told: &dyn Fn(Tell)| context.progress.pause(&mut || told(tell.found(found)));
+        begin(Stage::Tile);
+        let found = plan.is_done();
+        let tile = plan.run(context)?;
+        told(found, &|tell| tell_tile(&tile, tell));
+        begin(Stage::Cluster);
+        let (found, clusters) = run_clusters(measurement, model, &self.cluster, self.seed.seed, context)?;
+        told(found, &|tell| tell_clusters(&clusters, tell));
+        begin(Stage::Normals);
+        let plan = normals_plan(measurement, model, &self.normals)?;
+        let (found, normals) = (plan.is_done(), plan.run(context)?);
+        told(found, &|tell| tell_normals(&normals, tell));
+        begin(Stage::Fit);
+        let plan = fit_plan(model, &self.fit)?;
+        let (found, field) = (plan.is_done(), plan.run(context)?);
+        told(found, &|tell| tell_field(&field, tell));
+        begin(Stage::Appearance);
+        let plan = appearance_plan(model, &self.tile.lattice)?;
+        let (found, appearance) = (plan.is_done(), plan.run(context)?);
+        told(found, &|tell| tell_appearance(&appearance, tell));
+        context.progress.stage(None);
+        Ok(Some(clusters.clusters))
+    }
+}

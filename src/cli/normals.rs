@@ -1,0 +1,70 @@
+use std::path::{Path, PathBuf};
+
+use btfkit::error::Result;
+use btfkit::run::Context;
+use btfkit::stage::normals;
+use btfkit::words::counted;
+use clap::Args;
+
+use super::Tell;
+
+#[derive(Args)]
+pub(super) struct NormalsOptions {
+    /// Leave out shadowed and highlighted lights
+    #[arg(long)]
+    robust: bool,
+}
+
+/// Estimate the normal map of a model's tile by photometric stereo
+#[derive(Args)]
+#[command(after_help = "\
+Examples:
+  btf normals wood.zarr wood.model.zarr
+  btf normals wood.zarr wood.model.zarr --robust    leaves out shadowed and highlighted lights")]
+pub(super) struct Normals {
+    /// The measurement
+    measurement: PathBuf,
+    /// The model with the tile
+    model: PathBuf,
+    #[command(flatten)]
+    options: NormalsOptions,
+    /// Print what would be done, and do nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+impl Normals {
+    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        let plan = normals_plan(&self.measurement, &self.model, &self.options)?;
+        if self.dry_run {
+            return tell.plan(&plan.summary());
+        }
+        let found = plan.is_done();
+        tell_normals(&plan.run(context)?, tell.found(found));
+        Ok(())
+    }
+}
+
+pub(super) fn normals_plan(
+    measurement: &Path,
+    model: &Path,
+    options: &NormalsOptions,
+) -> Result<normals::Plan> {
+    normals::plan(&normals::Options {
+        measurement: measurement.into(),
+        model: model.into(),
+        robust: options.robust,
+    })
+}
+
+pub(super) fn tell_normals(report: &normals::Report, tell: Tell) {
+    let [x, y, z] = report.mean;
+    let lights = counted(report.lights, "light");
+    tell.stage(
+        "normals",
+        &format!(
+            "by {lights} of view {}; mean ({x:.3}, {y:.3}, {z:.3}), spread {:.1} degrees",
+            report.view, report.spread_deg
+        ),
+    );
+}

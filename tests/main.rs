@@ -37,6 +37,8 @@ mod determinism;
 mod document_pictures;
 #[path = "behaviour/equations.rs"]
 mod equations;
+#[path = "behaviour/examples.rs"]
+mod examples;
 #[path = "behaviour/fixture.rs"]
 mod fixture;
 #[cfg(feature = "hdf5")]

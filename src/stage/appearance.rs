@@ -26,6 +26,13 @@ pub struct Options {
     pub lattice: LatticeChoice,
 }
 
+impl Options {
+    /// With the lattice that was found in the picture, if any.
+    pub fn new(model: impl Into<PathBuf>) -> Self {
+        Self { model: model.into(), lattice: LatticeChoice::Auto }
+    }
+}
+
 /// A description, ready to be made.
 pub struct Plan {
     model: Model,

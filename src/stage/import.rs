@@ -32,6 +32,13 @@ pub struct Options {
     pub shard: Shard,
 }
 
+impl Options {
+    /// All views; reflectance 1 is white; packed so that every reader of Zarr opens the store.
+    pub fn new(store: impl Into<PathBuf>) -> Self {
+        Self { store: store.into(), white: 1.0, codec: Chain::Stock, shard: Shard::WHOLE }
+    }
+}
+
 /// Part `part` of `parts` of the units of a stage: every `parts`-th.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {

@@ -37,6 +37,21 @@ pub struct Options {
     pub scale: f64,
 }
 
+impl Options {
+    /// Leather of 128 x 128 texels under the 81 x 81 directions of UBO2003, seed 1.
+    pub fn new(archive: impl Into<PathBuf>) -> Self {
+        Self {
+            archive: archive.into(),
+            kind: Kind::Leather,
+            size: Size::new(128, 128),
+            views: 81,
+            lights: 81,
+            seed: 1,
+            scale: 1.0,
+        }
+    }
+}
+
 /// What was made.
 #[derive(Clone, Debug)]
 pub struct Report {

@@ -95,6 +95,24 @@ pub struct Options {
     pub time: Option<Duration>,
 }
 
+impl Options {
+    /// 256 clusters, or as many as the tile has texels, with medians as centres; seed 1.
+    pub fn new(measurement: impl Into<PathBuf>, model: impl Into<PathBuf>) -> Self {
+        Self {
+            measurement: measurement.into(),
+            model: model.into(),
+            amount: Amount::Usual,
+            centre: CentreRule::Median,
+            limits: Limits::default(),
+            first: None,
+            sample: None,
+            restarts: 1,
+            seed: 1,
+            time: None,
+        }
+    }
+}
+
 /// A step of a clustering that many processes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {

@@ -46,6 +46,22 @@ pub struct Options {
     pub shard: Shard,
 }
 
+impl Options {
+    /// By the coherent rule, seed 1, with the source of each texel.
+    pub fn new(model: impl Into<PathBuf>, output: impl Into<PathBuf>, size: Size) -> Self {
+        let coherent = coherent::Options { jitter: None, keep_source: true, keep_normals: false };
+        Self {
+            model: model.into(),
+            output: output.into(),
+            size,
+            seeds: 1..=1,
+            tileable: false,
+            by: By::Coherent(coherent),
+            shard: Shard::WHOLE,
+        }
+    }
+}
+
 /// A method with its options.
 #[derive(Clone, Debug)]
 pub enum By {

@@ -43,6 +43,19 @@ pub struct Options {
     pub seed: u64,
 }
 
+impl Options {
+    /// As large a tile as is good for up to 256 texels a side, of whole cells where the material is regular; seed 1.
+    pub fn new(measurement: impl Into<PathBuf>, model: impl Into<PathBuf>) -> Self {
+        Self {
+            measurement: measurement.into(),
+            model: model.into(),
+            choice: Choice::Auto,
+            lattice: LatticeChoice::Auto,
+            seed: 1,
+        }
+    }
+}
+
 /// A cut, ready to be made.
 pub struct Plan {
     measurement: Measurement,

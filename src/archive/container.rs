@@ -29,13 +29,17 @@ const ORDER: &str = "--order names a published list of directions (ubo81, bonn15
 pub(super) struct Recognised {
     pub(super) source: Box<dyn Source>,
     pub(super) samples: Option<Type>,
+    /// The options that it has a use for.
+    pub(super) uses: &'static [&'static str],
 }
 
 /// Opens a file that is a container by its first bytes; `None` if it is none.
 pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
     let head = files::read_head(path, HEAD_BYTES)?;
     let mut samples = None;
+    let mut uses: &[&str] = &[];
     let opened = if bonn::recognise(&head).is_some() {
+        uses = &["--rows"];
         Container::open(path, ORDER, |bytes| {
             let mut how = bonn::OpenOptions::default();
             how.rows = options.rows;
@@ -53,6 +57,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
             .map(|container| Container { beside: vec![place], ..container })
     } else if big::recognise(&head) {
         let order = order(options)?;
+        uses = &["--order"];
         Container::open(path, ORDER, |bytes| {
             let mut how = big::Options::default();
             how.order = order;
@@ -60,6 +65,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
         })
     } else if mif::recognise(&head) {
         let order = order(options)?;
+        uses = &["--order"];
         Container::open(path, ORDER, |bytes| {
             let mut how = mif::Options::default();
             how.order = order;
@@ -67,13 +73,16 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
         })
     } else if head.starts_with(NPY_MAGIC) {
         let beside = directions_beside(path, options, limits)?;
+        if beside.views.is_none() || beside.lights.is_none() || options.order.is_none() {
+            uses = &["--order"];
+        }
         Container::open(path, ORDER, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
     } else if crate::archive::hdf5::recognise(&head) {
-        return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples }));
+        return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples, uses }));
     } else {
         return Ok(None);
     };
-    Ok(Some(Recognised { source: Box::new(opened?), samples }))
+    Ok(Some(Recognised { source: Box::new(opened?), samples, uses }))
 }
 
 #[cfg(feature = "hdf5")]

@@ -101,6 +101,31 @@ pub struct Options {
     pub hdr_orientation: HdrOrientation,
 }
 
+impl Options {
+    /// Refuses options that say nothing about an archive.
+    fn expect_used(&self, uses: &[&str], source: &dyn Source) -> Result<()> {
+        let given = [
+            ("--pattern", self.pattern.is_some(), "pictures"),
+            ("--table", self.table.is_some(), "pictures"),
+            (
+                "--order",
+                self.order.is_some(),
+                "BIG and MIF files, and for arrays without directions of their own",
+            ),
+            ("--rows", self.rows == RowOrder::BottomFirst, "Bonn's containers"),
+            ("--hdr", self.hdr_orientation == HdrOrientation::Atrium, "pictures"),
+        ];
+        match given.into_iter().find(|(option, is_given, _)| *is_given && !uses.contains(option)) {
+            Some((option, _, whose)) => Err(Error::usage(format!(
+                "{}: {option} changes nothing, it is for {whose}; this is {}",
+                source.path().display(),
+                source.contents().format
+            ))),
+            None => Ok(()),
+        }
+    }
+}
+
 /// How an archive is read, as recipes hold it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Reading {
@@ -147,6 +172,7 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
         [path] if path.is_file() => container::recognise(path, options, &limits)?,
         _ => None,
     };
+    let uses = single.as_ref().map_or(pictures::USES, |recognised| recognised.uses);
     let source: Box<dyn Source> = match single {
         Some(recognised) => {
             // Databases of display values come from 8-bit images.
@@ -155,6 +181,7 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
         }
         None => Box::new(pictures::Pictures::open(paths, options, limits)?),
     };
+    options.expect_used(uses, source.as_ref())?;
     claims::require_channels(source.contents()).map_err(|error| error.context(source.path().display()))?;
     adapt::adapt(source, reading)
 }

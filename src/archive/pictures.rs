@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use btfkit_formats::picture::{self, DecodeOptions, PictureHeader};
 use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
@@ -15,6 +16,9 @@ use crate::run::{Context, recipe};
 
 /// Problems that an error names one by one.
 const NAMED_PROBLEMS: usize = 20;
+
+/// The options that pictures have a use for.
+pub(super) const USES: &[&str] = &["--pattern", "--table", "--hdr"];
 
 /// Pictures whose directions are known.
 pub(super) struct Pictures {
@@ -35,6 +39,8 @@ pub(super) struct Pictures {
     bytes_in_use: u64,
     decoding: DecodeOptions,
     limits: Limits,
+    /// CRC-32 of each image when all were checked, in the order of `images`.
+    checked: OnceLock<Vec<u32>>,
 }
 
 impl Pictures {
@@ -100,11 +106,13 @@ impl Pictures {
             bytes_in_use,
             decoding,
             limits,
+            checked: OnceLock::new(),
         })
     }
 
-    fn file(&self, view: usize, light: usize) -> usize {
-        self.images[view * self.contents.lights.len() + light]
+    /// Number of an image in the order of `images`.
+    fn number(&self, view: usize, light: usize) -> usize {
+        view * self.contents.lights.len() + light
     }
 
     /// Checks the structure of one image; returns its checksum.
@@ -165,8 +173,16 @@ impl Pictures {
         )))
     }
 
-    fn decode(&self, file: usize) -> Result<Samples> {
+    fn decode(&self, number: usize) -> Result<Samples> {
+        let file = self.images[number];
         let bytes = self.files.bytes(file)?;
+        let checked = self.checked.get().and_then(|all| all.get(number));
+        if checked.is_some_and(|&checked| checked != self.files.checksum(file, &bytes)) {
+            return Err(Error::input(format!(
+                "{}: the picture was changed after it had been checked",
+                self.files.name(file)
+            )));
+        }
         let image = picture::decode_with(&bytes, &self.decoding, &self.limits)
             .map_err(|error| error.in_entry(self.files.name(file)))?;
         let found = (image.width, image.height, &image.channels, image.samples.sample_type());
@@ -200,8 +216,8 @@ impl Source for Pictures {
         let mut samples = Samples::none(self.contents.sample_type);
         let mut problems = Vec::new();
         for light in lights {
-            let file = self.file(view, light);
-            match self.decode(file) {
+            let number = self.number(view, light);
+            match self.decode(number) {
                 // The only image: no copy.
                 Ok(image) if samples.is_empty() => samples = image,
                 Ok(image) => {
@@ -209,7 +225,7 @@ impl Source for Pictures {
                 }
                 Err(error) => problems.push(error.to_string()),
             }
-            self.files.release(file);
+            self.files.release(self.images[number]);
         }
         fail_on(&self.path, &problems)?;
         Ok(samples)
@@ -231,8 +247,14 @@ impl Source for Pictures {
             checked.iter().filter_map(|c| Some(c.as_ref().err()?.to_string())).collect();
         fail_on(&self.path, &problems)
             .map_err(|error| error.hint("replace these images and run the same command again"))?;
-        let checksums: Vec<u8> = checked.into_iter().flatten().flat_map(u32::to_le_bytes).collect();
-        Ok(recipe::digest_bytes(&checksums))
+        let checksums: Vec<u32> = checked.into_iter().flatten().collect();
+        let bytes: Vec<u8> = checksums.iter().copied().flat_map(u32::to_le_bytes).collect();
+        // What is read from now on must be what was checked, also where the source is checked again.
+        let found = self.checked.get_or_init(|| checksums.clone());
+        if *found != checksums {
+            return Err(Error::input(format!("{}: pictures were changed meanwhile", self.path.display())));
+        }
+        Ok(recipe::digest_bytes(&bytes))
     }
 }
 

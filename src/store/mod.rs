@@ -33,6 +33,7 @@ impl Store {
         let mut store = Self::at(path);
         let attributes = store.expect(kind)?;
         store.format = attributes.get("format").and_then(Value::as_u64).unwrap_or(FORMAT);
+        store.opened = attributes.get("digest").and_then(Value::as_str).map(str::to_owned);
         Ok((store, attributes))
     }
 

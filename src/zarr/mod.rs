@@ -59,6 +59,8 @@ pub struct Store {
     pub(crate) format: u64,
     /// Our attributes of the root as they were read last, and of which file: they are asked for at every array.
     known: Arc<Mutex<Option<Known>>>,
+    /// Digest of the recipe of a store that was opened to be read.
+    pub(crate) opened: Option<String>,
 }
 
 /// Attributes of a file as they were read.
@@ -89,6 +91,7 @@ impl Store {
             storage: Arc::new(MappedStorage::new(path)),
             format: FORMAT,
             known: Arc::default(),
+            opened: None,
         }
     }
 
@@ -136,6 +139,30 @@ impl Store {
         let ours = ours.map_err(|what| self.changed("", &what))?;
         *known = stamp.map(|stamp| (stamp, ours.clone()));
         Ok(Some(ours))
+    }
+
+    /// Refuses a store that was made anew by another recipe since it was opened to be read: what was read of it would be
+    /// mixed. To be asked when a file of it has been opened; one that is removed or replaced later stays as it was.
+    ///
+    /// # Errors
+    /// [`crate::Kind::Input`], and those of reading the attributes.
+    pub(crate) fn expect_unchanged(&self) -> Result<()> {
+        let Some(opened) = &self.opened else { return Ok(()) };
+        let same = |ours: &Map<String, Value>| ours.get("digest").and_then(Value::as_str) == Some(opened);
+        let stamp = Stamp::of(&self.metadata_path(""));
+        let known = match self.known.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+            Some((of, ours)) if Some(*of) == stamp => Some(same(ours)),
+            _ => None,
+        };
+        let is_same = match known {
+            Some(is_same) => is_same,
+            None => self.attributes()?.is_some_and(|ours| same(&ours)),
+        };
+        if is_same {
+            return Ok(());
+        }
+        Err(Error::input(format!("{} was made anew while it was read", self.path.display()))
+            .hint("run the same command again"))
     }
 
     /// All attributes of the root group; `None` where there is none.

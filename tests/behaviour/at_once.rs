@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use btfkit::store::measurement::Measurement;
+
 use crate::fixture::{btf, fixture, succeed, tree};
 
 /// Starts two commands at once; their exit codes and what they said.
@@ -189,4 +191,65 @@ fn of_two_arrays_that_replace_each_other_nothing_is_mixed() {
         assert_eq!((first, second), (Some(0), Some(0)));
         assert!(alone.contains(&made(&at("both"))), "a mixture of two measurements");
     }
+}
+
+#[test]
+fn a_store_that_is_made_anew_while_it_is_read_is_refused_and_never_mixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let [archive, store] = ["a.zip", "a.zarr"].map(|name| folder.path().join(name));
+    succeed(btf().arg("sample").arg(&archive).args(["--size", "24x24", "--views", "7", "--lights", "7"]));
+    for codec in ["stock", "predictive"] {
+        let import = |options: &[&str]| {
+            let mut command = btf();
+            succeed(
+                command
+                    .arg("import")
+                    .args([&archive, &store])
+                    .args(["--codec", codec, "--force"])
+                    .args(options),
+            )
+        };
+        import(&[]);
+        let opened = Measurement::open(&store).unwrap();
+        let window = opened.description().size.window();
+        let before = opened.read_reflectance(1, window).unwrap();
+        // By the same recipe it is the same: the metadata may be written anew.
+        import(&[]);
+        assert_eq!(opened.read_reflectance(1, window).unwrap(), before);
+        import(&["--turn", "90"]);
+        for result in
+            [opened.read_reflectance(1, window).map(|_| ()), opened.read_luminance(1, window).map(|_| ())]
+        {
+            let error = result.unwrap_err();
+            assert!(error.to_string().contains("was made anew while it was read"), "{codec}: {error}");
+        }
+        assert!(Measurement::open(&store).unwrap().read_reflectance(1, window).is_ok());
+    }
+}
+
+#[test]
+fn pictures_that_change_after_they_were_checked_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [archive, store, pictures] = ["a.zip", "a.zarr", "pictures"].map(|name| folder.path().join(name));
+    succeed(btf().arg("sample").arg(&archive).args(["--size", "24x24", "--views", "7", "--lights", "7"]));
+    succeed(btf().arg("import").args([&archive, &store]));
+    succeed(btf().arg("export").args([&store, &pictures]).args(["--to", "png"]));
+    let source = btfkit::archive::open(&[pictures.clone()], &btfkit::archive::Options::default()).unwrap();
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let silent = btfkit::run::progress::Silent;
+    let context = btfkit::run::Context::new(&silent, &stop, 1, 1 << 28).unwrap();
+    source.check(&context).unwrap();
+    let before = source.read_images(0, 0..2).unwrap();
+    let mut names: Vec<_> =
+        std::fs::read_dir(pictures.join("tv0_pv0")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    names.sort();
+    // Another picture of the same size in place of each.
+    let other = std::fs::read(&names[names.len() - 1]).unwrap();
+    let first = std::fs::read(&names[0]).unwrap();
+    std::fs::write(&names[0], &other).unwrap();
+    let error = (0..7).find_map(|view| source.read_images(view, 0..7).err()).unwrap();
+    assert!(error.to_string().contains("was changed after it had been checked"), "{error}");
+    assert!(source.check(&context).is_err());
+    std::fs::write(&names[0], &first).unwrap();
+    assert_eq!(source.read_images(0, 0..2).unwrap(), before);
 }

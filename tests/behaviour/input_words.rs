@@ -4,7 +4,7 @@ use btfkit_formats::picture::exr;
 use btfkit_formats::picture::{self, Picture};
 use btfkit_formats::{Samples, f16};
 
-use crate::fixture::{btf, fail, succeed};
+use crate::fixture::{btf, fail, fixture, succeed};
 use crate::odd_archives::{RIGHT, azimuths, png, refused, set, three, told};
 
 #[test]
@@ -126,4 +126,27 @@ fn the_file_of_a_picture_counts_as_memory() {
     import.arg("import").arg(&root).arg(folder.path().join("s.zarr")).arg("--memory");
     let said = fail(import.arg("16MiB"), 2);
     assert!(said.contains("checking pictures of up to 49 MiB takes 61 MiB"), "{said}");
+}
+
+#[test]
+fn options_that_an_archive_has_no_use_for_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(btf().arg("export").arg(fixture().measurement()).arg(at("a.npy")));
+    succeed(btf().arg("export").arg(fixture().measurement()).arg(at("a.btf")));
+    succeed(btf().arg("export").arg(fixture().measurement()).arg(at("a.zip")));
+    for (archive, options, whose) in [
+        ("a.npy", &["--table", "none.csv"][..], "it is for pictures"),
+        ("a.npy", &["--pattern", "{theta_i}"], "it is for pictures"),
+        ("a.npy", &["--order", "ubo81"], "without directions of their own"),
+        ("a.npy", &["--rows", "reversed"], "Bonn's containers"),
+        ("a.btf", &["--order", "ubo81"], "BIG and MIF"),
+        ("a.btf", &["--hdr", "atrium"], "it is for pictures"),
+        ("a.zip", &["--rows", "reversed"], "Bonn's containers"),
+        ("a.zip", &["--order", "ubo81"], "BIG and MIF"),
+    ] {
+        let told = fail(btf().arg("import").args([at(archive), at("a.zarr")]).args(options), 2);
+        assert!(told.contains("changes nothing") && told.contains(whose), "{archive} {options:?}: {told}");
+        assert!(!at("a.zarr").exists());
+    }
 }

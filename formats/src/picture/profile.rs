@@ -12,9 +12,33 @@ pub(crate) fn of_icc(profile: &[u8]) -> Option<String> {
     let Some(name) = description(profile) else {
         return Some("an ICC profile without a readable name".to_owned());
     };
-    let is_srgb = name.to_lowercase().replace(['-', '_', ' '], "").contains("srgb");
     let shown: String = name.chars().take(LONGEST_NAME).collect();
-    (!is_srgb).then(|| format!("the ICC profile {shown:?}"))
+    (!is_srgb(&name)).then(|| format!("the ICC profile {shown:?}"))
+}
+
+/// Whether a profile is called as those of sRGB are: `sRGB IEC61966-2.1`, `sRGB built-in`, `GIMP built-in sRGB`. There are
+/// also `GIMP built-in Linear sRGB`, `sRGB-elle-V2-g10.icc` (linear) and `scRGB`: a word that is not known is stated.
+fn is_srgb(name: &str) -> bool {
+    const KNOWN: [&str; 12] = [
+        "srgb",
+        "iec",
+        "built",
+        "in",
+        "gimp",
+        "artifex",
+        "icc",
+        "profile",
+        "color",
+        "space",
+        "v",
+        "preference",
+    ];
+    let name = name.to_lowercase();
+    let mut words = name.split(|c: char| !(c.is_alphanumeric() || c == '.')).filter(|word| !word.is_empty());
+    // Versions and years follow words or stand alone.
+    let version = |c: char| c.is_ascii_digit() || c == '.';
+    let known = |word: &str| word.chars().all(version) || KNOWN.contains(&word.trim_end_matches(version));
+    name.contains("srgb") && words.all(known)
 }
 
 /// Chromaticities of sRGB: red, green, blue, white.
@@ -80,4 +104,34 @@ fn description(profile: &[u8]) -> Option<String> {
         return Some(char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect());
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_srgb_are_told_from_those_of_its_linear_and_wide_kin() {
+        for name in [
+            "sRGB",
+            "sRGB IEC61966-2.1",
+            "sRGB built-in",
+            "GIMP built-in sRGB",
+            "Artifex sRGB ICC Profile",
+            "sRGB2014",
+        ] {
+            assert!(is_srgb(name), "{name}");
+        }
+        for name in [
+            "GIMP built-in Linear sRGB",
+            "linear sRGB",
+            "Not sRGB",
+            "scRGB",
+            "sRGB-elle-V2-g10.icc",
+            "Adobe RGB (1998)",
+            "",
+        ] {
+            assert!(!is_srgb(name), "{name}");
+        }
+    }
 }

@@ -184,7 +184,7 @@ impl Measurement {
                     .flat_map(move |sy| columns.clone().map(move |sx| [sy, sx]))
             })
             .collect();
-        touched
+        let shards = touched
             .into_iter()
             .map(|[sy, sx]| {
                 let corner = Window { y: sy * self.side, x: sx * self.side, size: Size::new(1, 1) };
@@ -195,7 +195,9 @@ impl Measurement {
                 self.expect_chunks(&path, &chunks, [sy, sx])?;
                 Ok(([sy, sx], Shard { file, chunks }))
             })
-            .collect()
+            .collect::<Result<_>>()?;
+        self.store.expect_unchanged()?;
+        Ok(shards)
     }
 }
 

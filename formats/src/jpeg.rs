@@ -17,6 +17,7 @@ mod frame;
 mod huffman;
 mod interleave;
 mod marker;
+mod means;
 pub(crate) mod profile;
 mod progress;
 mod structure;

@@ -234,7 +234,8 @@ fn pictures_that_change_after_they_were_checked_are_refused() {
     succeed(btf().arg("sample").arg(&archive).args(["--size", "24x24", "--views", "7", "--lights", "7"]));
     succeed(btf().arg("import").args([&archive, &store]));
     succeed(btf().arg("export").args([&store, &pictures]).args(["--to", "png"]));
-    let source = btfkit::archive::open(&[pictures.clone()], &btfkit::archive::Options::default()).unwrap();
+    let source =
+        btfkit::archive::open(std::slice::from_ref(&pictures), &btfkit::archive::Options::default()).unwrap();
     let stop = std::sync::atomic::AtomicBool::new(false);
     let silent = btfkit::run::progress::Silent;
     let context = btfkit::run::Context::new(&silent, &stop, 1, 1 << 28).unwrap();

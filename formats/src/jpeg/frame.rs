@@ -2,6 +2,7 @@
 
 use super::Header;
 use super::marker::{entropy_coded, segment};
+use super::means::Means;
 use super::progress::{Band, Progress};
 use crate::reader::Reader;
 use crate::{Error, ErrorKind, Limits, Result};
@@ -89,6 +90,15 @@ pub(super) enum Arrangement {
     OneComponent(usize),
     /// The file with its scans put together.
     ScatteredScans(Grid),
+}
+
+/// A scan that was stepped over.
+#[derive(Debug)]
+pub(super) struct Scanned {
+    /// Where each interval of its data ends.
+    pub(super) ends: Vec<usize>,
+    /// What of it is the first scan of means in a progressive file.
+    pub(super) means: Option<Means>,
 }
 
 /// The frame header and what its scans have sent so far.
@@ -179,18 +189,17 @@ impl Frame {
         })
     }
 
-    /// Reads a scan header and steps over the scan's data; returns where each interval of them ends.
-    /// `restart_interval` counts coded units; 0 is none.
-    pub(super) fn read_scan(&mut self, reader: &mut Reader<'_>, restart_interval: u64) -> Result<Vec<usize>> {
+    /// Reads a scan header and steps over the scan's data. `restart_interval` counts coded units; 0 is none.
+    pub(super) fn read_scan(&mut self, reader: &mut Reader<'_>, restart_interval: u64) -> Result<Scanned> {
         let at = reader.position();
         let relative = |e: Error| e.at(at);
         let mut fields = Reader::new(segment(reader)?);
         let count = fields.u8().map_err(relative)?;
-        let mut selected = Vec::new();
+        let (mut selected, mut slots) = (Vec::new(), Vec::new());
         for _ in 0..count {
             let id = fields.u8().map_err(relative)?;
             // The numbers of the Huffman tables; the decoder checks that they exist.
-            fields.u8().map_err(relative)?;
+            slots.push(fields.u8().map_err(relative)?);
             let Some(position) = self.components.iter().position(|c| c.id == id) else {
                 return Err(
                     Error::malformed(format!("a scan of component {id}"), "one of the frame's").at(at)
@@ -246,7 +255,16 @@ impl Frame {
             )
             .at(data_at));
         }
-        Ok(data.ends)
+        let is_first_of_means = self.header.progressive && band.first == 0 && band.high == 0;
+        let means = is_first_of_means.then(|| {
+            let blocks =
+                |&position: &usize| self.components.get(position).map_or(0, Component::blocks_per_mcu);
+            // The coded unit of a single component is a block.
+            let blocks = |position: &usize| if selected.len() == 1 { 1 } else { blocks(position) };
+            let members = selected.iter().map(blocks).zip(slots.iter().map(|slot| slot >> 4)).collect();
+            Means { members, units, data: data_at..reader.position() }
+        });
+        Ok(Scanned { ends: data.ends, means })
     }
 
     fn require_legal_band(&self, selected: &[usize], band: Band) -> Result<()> {

@@ -1,7 +1,10 @@
 //! The walk over the markers of a JPEG (ITU-T T.81, annex B).
 
+use std::collections::HashMap;
+
 use super::Header;
-use super::frame::{Arrangement, Frame};
+use super::frame::{Arrangement, Frame, Scanned};
+use super::huffman::{Slot, Table};
 use super::marker;
 use crate::picture::orientation;
 use crate::reader::Reader;
@@ -55,6 +58,7 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
     let mut orientation = 1;
     let (mut is_jfif, mut adobe, mut transform) = (false, Vec::new(), None);
     let (mut red_ids, mut data_ends) = (Vec::new(), Vec::new());
+    let mut tables: HashMap<Slot, Table> = HashMap::new();
     loop {
         let at = reader.position();
         match marker::next(&mut reader)? {
@@ -65,6 +69,10 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                 let read = Frame::read(&mut reader, code == marker::SOF2, limits)?;
                 red_ids.extend(read.sampling_at.checked_sub(1).filter(|_| read.ids().eq(*b"RGB")));
                 frame = Some(read);
+            }
+            marker::DHT => {
+                let found = Table::read_all(marker::segment(&mut reader)?).map_err(|e| e.at(at))?;
+                tables.extend(found);
             }
             marker::DRI => restart_interval = read_restart_interval(&mut reader)?,
             marker::APP1 if frame.is_none() => orientation = read_orientation(&mut reader, orientation)?,
@@ -90,7 +98,12 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                     return Err(Error::malformed("a scan", "a frame header (SOF) before it").at(at));
                 };
                 let header_at = reader.position();
-                data_ends.extend(frame.read_scan(&mut reader, restart_interval)?);
+                let Scanned { ends, means } = frame.read_scan(&mut reader, restart_interval)?;
+                data_ends.extend(ends);
+                if let Some(means) = means {
+                    let all = means.require_all(bytes, &tables, restart_interval);
+                    all.map_err(|error| error.at(header_at))?;
+                }
                 if !red_ids.is_empty() {
                     // Components of a scan stand in the order of the frame.
                     let first = header_at.saturating_add(3);

@@ -240,3 +240,24 @@ fn an_imports_recipe_names_all_that_its_bytes_depend_on() {
         assert!(other[key] != base[key], "{source} {options:?} {key}: {}", other[key]);
     }
 }
+
+#[test]
+fn options_of_some_formats_are_in_the_recipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let reading = |source: &str, options: &[&str]| {
+        let mut import = btf();
+        import.arg("import").args([at(source), at("new.zarr")]).args(options).arg("--dry-run");
+        let plan: serde_json::Value = serde_json::from_str(&succeed(&mut import)).unwrap();
+        plan["recipe"]["reading"].clone()
+    };
+    succeed(btf().arg("sample").arg(at("a.zip")).args(["--size", "8x8"]));
+    succeed(btf().arg("import").args([at("a.zip"), at("a.zarr")]));
+    succeed(btf().arg("export").args([at("a.zarr"), at("a.npy")]));
+    std::fs::remove_file(at("a.views.npy")).unwrap();
+    std::fs::remove_file(at("a.lights.npy")).unwrap();
+    assert_eq!(reading("a.npy", &["--order", "ubo81"])["order"], "ubo81");
+    succeed(btf().arg("export").args([at("a.zarr"), at("a.btf")]));
+    let [plain, reversed] = [&[][..], &["--rows", "reversed"]].map(|options| reading("a.btf", options));
+    assert_ne!(plain, reversed);
+}

@@ -73,7 +73,7 @@ pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Resu
         })
     } else if head.starts_with(NPY_MAGIC) {
         let beside = directions_beside(path, options, limits)?;
-        if beside.views.is_none() || beside.lights.is_none() || options.order.is_none() {
+        if !["views", "lights"].into_iter().all(|kind| path.with_extension(format!("{kind}.npy")).is_file()) {
             uses = &["--order"];
         }
         Container::open(path, ORDER, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))

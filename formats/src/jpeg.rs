@@ -7,9 +7,8 @@
 //! is found where data end too early (before a restart marker, a further scan, the end of the picture), and where more
 //! than 16 bytes of them are left at the end, as those of rows that the header does not claim.
 //!
-//! What this cannot see: bytes changed or left out inside a scan that still decode, what is missing at the very end of
-//! a progressive picture's first scan, and data that are left over in an interval that is not the last. A zip's CRC-32
-//! does.
+//! What this cannot see: bytes changed or left out inside a scan that still decode, and data that are left over in an
+//! interval that is not the last. A zip's CRC-32 does.
 
 mod decode;
 mod encode;

@@ -99,7 +99,7 @@ impl Files {
         let (before, hidden) = (self.entries.len(), self.hidden);
         let folder = list.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         self.add_folder(folder, limits)?;
-        if !self.entries.iter().skip(before).any(|entry| self::is_picture(&entry.name)) {
+        if !self.entries.iter().skip(before).any(|entry| is_picture(&entry.name)) {
             self.entries.truncate(before);
             self.hidden = hidden;
             self.add_folder(&folder.join(".."), limits)?;

@@ -39,10 +39,9 @@ use std::time::Duration;
 
 use btfkit::disk::output::Made;
 use btfkit::error::{Error, Kind, Result};
-use btfkit::run::Context;
-use btfkit::run::Existing;
 use btfkit::run::budget::{Allowance, cannot_start, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
+use btfkit::run::{Context, Existing};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
 use bytes::bytes_text;
 use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};

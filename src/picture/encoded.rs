@@ -7,8 +7,7 @@ use image::codecs::tiff::TiffEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 
-use super::refused;
-use super::{Bits, Encoding, Ending, Meaning};
+use super::{Bits, Encoding, Ending, Meaning, refused};
 use crate::error::{Error, Result};
 use crate::shape::Size;
 

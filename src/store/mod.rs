@@ -17,8 +17,7 @@ use serde_json::{Map, Value, json};
 use crate::disk::lock::Lock;
 use crate::disk::temporary::{Temporary, remove_folder};
 use crate::error::{Error, Result};
-use crate::run::Existing;
-use crate::run::{Context, recipe};
+use crate::run::{Context, Existing, recipe};
 use crate::zarr::{FORMAT, Store, metadata};
 
 /// Name of the lock that whoever writes a store by a recipe shares with others who do.

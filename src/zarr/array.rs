@@ -100,12 +100,12 @@ named!(i8 => int8, u8 => uint8, i16 => int16, u16 => uint16, u32 => uint32, i32 
 
 /// An array of a [`Store`] whose metadata are as its layout says.
 pub struct Array {
-    pub(crate) name: String,
-    pub(crate) shape: Vec<u64>,
-    pub(crate) chunk: Vec<u64>,
-    pub(crate) shard: Option<Vec<u64>>,
+    pub(super) name: String,
+    pub(super) shape: Vec<u64>,
+    pub(super) chunk: Vec<u64>,
+    pub(super) shard: Option<Vec<u64>>,
     /// Whether chunks are plain zstd.
-    pub(crate) is_plain: bool,
+    pub(super) is_plain: bool,
     inner: zarrs::array::Array<MappedStorage>,
 }
 
@@ -126,7 +126,7 @@ impl Array {
     }
 
     /// What is written at once.
-    pub(crate) fn outer(&self) -> &[u64] {
+    pub(super) fn outer(&self) -> &[u64] {
         self.shard.as_deref().unwrap_or(&self.chunk)
     }
 
@@ -136,7 +136,7 @@ impl Array {
     }
 
     /// Chunks of a shard.
-    pub(crate) fn shard_chunks(&self) -> Option<usize> {
+    pub(super) fn shard_chunks(&self) -> Option<usize> {
         let shard = self.shard.as_ref()?;
         Some(shard.iter().zip(&self.chunk).map(|(&outer, &inner)| outer / inner).product::<u64>() as usize)
     }

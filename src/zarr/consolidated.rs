@@ -8,7 +8,7 @@ use super::metadata::read_object;
 use crate::error::{Error, Result};
 
 /// The member of the root's document.
-pub(crate) const MEMBER: &str = "consolidated_metadata";
+pub(super) const MEMBER: &str = "consolidated_metadata";
 
 /// The arrays that are coordinates of others, by which xarray selects.
 const COORDINATES: [&str; 4] = ["view_theta", "view_phi", "light_theta", "light_phi"];
@@ -56,7 +56,7 @@ impl Store {
 }
 
 /// Says which arrays are coordinates, as CF has it.
-pub(crate) fn name_coordinates(members: &Map<String, Value>, attributes: &mut Map<String, Value>) {
+pub(super) fn name_coordinates(members: &Map<String, Value>, attributes: &mut Map<String, Value>) {
     let all = members.get(MEMBER).and_then(|member| member.get("metadata"));
     let is_there = |name: &&&str| all.is_some_and(|all| all.get(**name).is_some());
     let names: Vec<&str> = COORDINATES.iter().filter(is_there).copied().collect();

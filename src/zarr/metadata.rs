@@ -158,7 +158,7 @@ pub(crate) fn check_digest(entry: &Map<String, Value>) -> std::result::Result<()
 ///
 /// # Errors
 /// Where it is not one of Zarr v3, or has members that must be understood and are not.
-pub(crate) fn group_attributes(
+pub(super) fn group_attributes(
     document: &Map<String, Value>,
 ) -> std::result::Result<Map<String, Value>, String> {
     if document.get("zarr_format") != Some(&json!(3)) || document.get("node_type") != Some(&json!("group")) {
@@ -178,7 +178,7 @@ pub(crate) fn group_attributes(
 }
 
 /// Whether a member that is not known may be left alone, as Zarr v3 has it.
-pub(crate) fn may_be_ignored(value: &Value) -> bool {
+pub(super) fn may_be_ignored(value: &Value) -> bool {
     value.is_null() || value.get("must_understand") == Some(&json!(false))
 }
 

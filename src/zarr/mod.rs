@@ -121,12 +121,17 @@ impl Store {
     /// # Errors
     /// Where the root group is damaged, or was changed.
     pub(crate) fn attributes(&self) -> Result<Option<Map<String, Value>>> {
+        self.with_attributes(Map::clone)
+    }
+
+    /// What `of` finds in them.
+    fn with_attributes<T>(&self, of: impl FnOnce(&Map<String, Value>) -> T) -> Result<Option<T>> {
         let stamp = Stamp::of(&self.metadata_path(""));
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((of, ours)) = known.as_ref()
-            && Some(*of) == stamp
+        if let Some((file, ours)) = known.as_ref()
+            && Some(*file) == stamp
         {
-            return Ok(Some(ours.clone()));
+            return Ok(Some(of(ours)));
         }
         let found = self.root()?.and_then(|mut attributes| attributes.remove("btfkit"));
         let ours = match found {
@@ -137,8 +142,9 @@ impl Store {
             }
         };
         let ours = ours.map_err(|what| self.changed("", &what))?;
-        *known = stamp.map(|stamp| (stamp, ours.clone()));
-        Ok(Some(ours))
+        let result = of(&ours);
+        *known = stamp.map(|stamp| (stamp, ours));
+        Ok(Some(result))
     }
 
     /// Refuses a store that was made anew by another recipe since it was opened to be read: what was read of it would be
@@ -149,16 +155,7 @@ impl Store {
     pub(crate) fn expect_unchanged(&self) -> Result<()> {
         let Some(opened) = &self.opened else { return Ok(()) };
         let same = |ours: &Map<String, Value>| ours.get("digest").and_then(Value::as_str) == Some(opened);
-        let stamp = Stamp::of(&self.metadata_path(""));
-        let known = match self.known.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
-            Some((of, ours)) if Some(*of) == stamp => Some(same(ours)),
-            _ => None,
-        };
-        let is_same = match known {
-            Some(is_same) => is_same,
-            None => self.attributes()?.is_some_and(|ours| same(&ours)),
-        };
-        if is_same {
+        if self.with_attributes(same)? == Some(true) {
             return Ok(());
         }
         Err(Error::input(format!("{} was made anew while it was read", self.path.display()))

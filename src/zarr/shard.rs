@@ -45,7 +45,7 @@ pub(crate) fn chunk_ranges(shard: &[u8], chunks: usize) -> Result<Vec<Option<Ran
 }
 
 /// Whether a shard ends with an intact index, and is as long as that says; of its chunks nothing is read.
-pub(crate) fn has_index(mut shard: impl Read + Seek, chunks: usize) -> std::io::Result<bool> {
+pub(super) fn has_index(mut shard: impl Read + Seek, chunks: usize) -> std::io::Result<bool> {
     let end = shard.seek(SeekFrom::End(0))?;
     let Some(data) = end.checked_sub(index_bytes(chunks) as u64) else { return Ok(false) };
     shard.seek(SeekFrom::Start(data))?;

@@ -257,10 +257,11 @@ impl Frame {
         }
         let is_first_of_means = self.header.progressive && band.first == 0 && band.high == 0;
         let means = is_first_of_means.then(|| {
-            let blocks =
-                |&position: &usize| self.components.get(position).map_or(0, Component::blocks_per_mcu);
             // The coded unit of a single component is a block.
-            let blocks = |position: &usize| if selected.len() == 1 { 1 } else { blocks(position) };
+            let blocks = |&position: &usize| match selected.len() {
+                1 => 1,
+                _ => self.components.get(position).map_or(0, Component::blocks_per_mcu),
+            };
             let members = selected.iter().map(blocks).zip(slots.iter().map(|slot| slot >> 4)).collect();
             Means { members, units, data: data_at..reader.position() }
         });

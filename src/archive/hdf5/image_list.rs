@@ -5,7 +5,7 @@ use std::ops::Range;
 use btfkit_formats::{Contents, Limits, SampleType};
 use hdf5::H5Type;
 
-use super::dataset::{File, Table};
+use super::dataset::{File, Table, side};
 use super::grid::Grid;
 use crate::error::{Error, Result};
 
@@ -41,8 +41,8 @@ impl ImageList {
         let grid = Grid::of(&views, &lights, limits).map_err(|what| file.error(what))?;
         let contents = Contents {
             format: format!("HDF5, list of {count} images"),
-            width: super::dataset::side(width, &color)?,
-            height: super::dataset::side(height, &color)?,
+            width: side(width, &color)?,
+            height: side(height, &color)?,
             channels: ["R", "G", "B"].map(str::to_owned).to_vec(),
             sample_type: SampleType::F32,
             views: grid.views.clone(),

@@ -7,7 +7,7 @@ use hdf5::H5Type;
 use serde_json::Value;
 
 use super::attribute::Attributes;
-use super::dataset::{File, Table};
+use super::dataset::{File, Table, side};
 use crate::error::Result;
 use crate::store::measurement::KIND;
 
@@ -80,8 +80,8 @@ impl Texels {
         let sample_type = reflectance.sample_type()?;
         let contents = Contents {
             format: format!("HDF5, btfkit measurement, {}", sample_type.name()),
-            width: super::dataset::side(width, &reflectance)?,
-            height: super::dataset::side(height, &reflectance)?,
+            width: side(width, &reflectance)?,
+            height: side(height, &reflectance)?,
             channels: names,
             sample_type,
             views: read_directions(file, DIRECTIONS[0], views, limits)?,

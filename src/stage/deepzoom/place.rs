@@ -9,14 +9,11 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::is_lock;
-use crate::disk::output::expect_outside_stores;
-use crate::disk::output::{holds, settle};
-use crate::disk::temporary;
-use crate::disk::temporary::Temporary;
+use crate::disk::output::{expect_outside_stores, holds, settle};
+use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
-use crate::run::Existing;
-use crate::run::{Context, recipe};
+use crate::run::{Context, Existing, recipe};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::zarr::storage::MappedStorage;
 use crate::zarr::{FORMAT, Store, metadata};

@@ -41,9 +41,6 @@ mod equations;
 mod examples;
 #[path = "behaviour/fixture.rs"]
 mod fixture;
-#[cfg(feature = "hdf5")]
-#[path = "behaviour/hdf5.rs"]
-mod hdf5;
 #[path = "behaviour/input_words.rs"]
 mod input_words;
 #[path = "behaviour/interruption.rs"]

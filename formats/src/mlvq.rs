@@ -84,7 +84,7 @@ fn assumptions(settled: Settled) -> Vec<String> {
     ];
     let Settled { known, by_rule } = settled;
     if known > 0 {
-        list.push(format!("{known} ambiguous zero bytes of the tables were settled as the caller said."));
+        list.push(format!("{known} ambiguous zero bytes of the tables were read as zero_bytes.txt says."));
     }
     if by_rule > 0 {
         list.push(format!(

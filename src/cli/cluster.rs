@@ -10,6 +10,7 @@ use btfkit::stage::import::Shard;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
+use super::given::Given;
 use super::tile::Seed;
 use super::{Tell, bytes_text, number};
 
@@ -28,7 +29,7 @@ pub(super) struct ClusterOptions {
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
     /// Most passes over the texels
-    #[arg(long, default_value_t = Limits::default().passes)]
+    #[arg(long, default_value_t = Limits::default().passes, value_parser = number::count)]
     passes: usize,
     /// Stop when a pass improves the objective by less than this share
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
@@ -118,8 +119,9 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, tell: Tell) -> Result<()> {
         let Self { measurement, model, options, seed, .. } = self;
+        self.refuse_idle(given)?;
         if self.dry_run {
             return match &options.clusters_of {
                 Some(from) => tell.plan(&taken_plan(model, from)?.summary()),
@@ -138,6 +140,21 @@ impl Cluster {
             Stepped::Assigned { pass, found, written } => {
                 tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses options that would change nothing.
+    fn refuse_idle(&self, given: &Given) -> Result<()> {
+        match self.step {
+            Some(StepName::Prepare) => given.refuse_these(&["pass", "shard"], "in --step prepare")?,
+            Some(StepName::Reduce) => {
+                given.refuse_these(&["shard"], "in --step reduce, which is one process")?
+            }
+            _ => {}
+        }
+        if self.options.clusters_of.is_some() {
+            given.refuse_these(&["seed"], "beside --clusters-of: nothing is drawn at random")?;
         }
         Ok(())
     }
@@ -181,17 +198,26 @@ fn cluster_plan(
     options: &ClusterOptions,
     seed: u64,
 ) -> Result<cluster::Plan> {
+    cluster::plan(&cluster_options(measurement, model, options, seed))
+}
+
+pub(super) fn cluster_options(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+) -> cluster::Options {
     let centre = match options.centre {
         Centre::Median => CentreRule::Median,
         Centre::Mean => CentreRule::Mean,
     };
-    let limits = Limits { passes: options.passes.max(1), tolerance: options.tolerance };
+    let limits = Limits { passes: options.passes, tolerance: options.tolerance };
     let amount = match (options.clusters, options.error, options.ratio) {
         (_, Some(error), _) => Amount::Error(error),
         (_, _, Some(ratio)) => Amount::Ratio(ratio),
         (clusters, ..) => clusters.map_or(Amount::Usual, Amount::Clusters),
     };
-    cluster::plan(&cluster::Options {
+    cluster::Options {
         measurement: measurement.into(),
         model: model.into(),
         amount,
@@ -205,8 +231,11 @@ fn cluster_plan(
         restarts: options.restarts,
         seed,
         time: options.time.map(Duration::from_secs),
-    })
+    }
 }
+
+/// A mean |dL*| above this is seen by everybody.
+const LARGE: f64 = 3.0;
 
 pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
@@ -215,6 +244,12 @@ pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
         (0, all) => format!("after {}", counted(all, "pass")),
         (batches, all) => {
             format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
+        }
+    };
+    // Told behind the rest, whichever of the two.
+    let tell_error = || {
+        if report.representative_lightness_error > LARGE {
+            tell.line("          a large error: more clusters leave less of it (--clusters N; btf curve shows how much)");
         }
     };
     let stored = report.representative_bytes + report.index_bytes;
@@ -226,7 +261,9 @@ pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
             "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
             report.clusters
         );
-        return tell.stage("clusters", &text);
+        tell.stage("clusters", &text);
+        tell_error();
+        return;
     }
     let how = taken
         .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
@@ -250,4 +287,5 @@ pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
         ratio(report.tile_bytes),
         ratio(report.measurement_bytes)
     ));
+    tell_error();
 }

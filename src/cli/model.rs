@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::Tell;
 use super::appearance::{appearance_plan, tell_appearance};
-use super::cluster::{ClusterOptions, run_clusters, tell_clusters};
+use super::cluster::{ClusterOptions, cluster_options, run_clusters, tell_clusters};
 use super::each::{Ended, Line, each};
 use super::fit::{FitOptions, fit_plan, tell_field};
 use super::normals::{NormalsOptions, normals_plan, tell_normals};
@@ -81,6 +81,10 @@ impl Model {
             let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
             context.progress.stage(Some(stage));
         };
+        context.tell_enough(plan.enough_for_model(
+            &cluster_options(measurement, model, &self.cluster, self.seed.seed),
+            context.threads,
+        ));
         // A line may be told only while no bar is drawn.
         let tell = tell.brief();
         let told = |found: bool, told: &dyn Fn(Tell)| context.progress.pause(&mut || told(tell.found(found)));

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use btfkit::error::Result;
+use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::sample::{Kind, MOST_SIDE};
 use btfkit::shape::Size;
@@ -62,6 +62,12 @@ impl From<Material> for Kind {
 
 impl Sample {
     pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+        if self.archive.extension().is_some_and(|ending| ending == "zarr") {
+            let archive = self.archive.with_extension("zip");
+            let (named, archive) = (self.archive.display(), archive.display());
+            return Err(Error::usage(format!("{named}: btf sample writes a zip, which is no store"))
+                .hint(format!("btf sample {archive}, then btf import {archive} {named}")));
+        }
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),

@@ -134,7 +134,10 @@ impl Model {
     /// Opens a model for reading.
     pub fn open(path: &Path) -> Result<Self> {
         let model = Self { store: Store::open(path, KIND)?.0 };
-        model.entries()?;
+        // Everything else of a model is read by what its tile says.
+        if let Some(tile) = model.entry(Stage::Tile)? {
+            model.store.see(Stage::Tile.name(), &tile.digest);
+        }
         Ok(model)
     }
 
@@ -183,10 +186,14 @@ impl Model {
     }
 
     fn done(&self, stage: Stage) -> Result<Entry> {
-        self.entry(stage)?.ok_or_else(|| {
+        self.store.expect_unchanged()?;
+        let entry = self.entry(stage)?.ok_or_else(|| {
             Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
                 .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
-        })
+        })?;
+        self.store.see(stage.name(), &entry.digest);
+        self.store.expect_unchanged()?;
+        Ok(entry)
     }
 
     /// The attributes of a stage that is done: `recipe`, `digest` and `report`.
@@ -267,6 +274,7 @@ impl Model {
                 }
             }
             self.write_root(attributes)?;
+            stage.builders().iter().chain([&stage]).for_each(|taken| self.store.forget(taken.name()));
         }
         for array in arrays {
             self.store.remove(&array)?;
@@ -403,7 +411,9 @@ impl Model {
         let kept = self.done(stage)?.checksums;
         let Some(kept) = kept else { return Ok(array) };
         let kept = kept.get(name).map(String::as_str).unwrap_or_default();
-        let found = self.store.checksums(&array)?;
+        let found = self.store.checksums(&array);
+        self.store.expect_unchanged()?;
+        let found = found?;
         if found == kept {
             return Ok(array);
         }

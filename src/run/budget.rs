@@ -34,6 +34,7 @@ impl Allowance {
     /// # Errors
     /// With what it needs and what to do: [`Kind::Usage`], or [`Kind::Internal`] where the system leaves no more.
     pub fn require(self, what: &str, needed: u64, otherwise: &str) -> Result<()> {
+        let needed = needed.max(OWN_BYTES);
         if needed <= self.bytes {
             return Ok(());
         }

@@ -183,6 +183,8 @@ impl Store {
     }
 
     fn expect_ours_or_nothing(&self) -> Result<()> {
+        // A link that leads nowhere is no free name.
+        recognise::expect_readable(self.path())?;
         let occupied = match self.attributes()? {
             Some(_) => false,
             None => self.metadata_path("").exists() || recognise::other(self.path())?.is_some(),

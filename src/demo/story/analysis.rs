@@ -76,13 +76,12 @@ pub(super) fn clusters(figures: &Figures) -> Section {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let intro = format!(
         "<p>Texels that look alike under all views and lights are put into one cluster: <b>{} clusters</b>, \
-         after {} passes over the texels; {} of them have a single texel. Texels are compared by their \
-         lightness L* under all pairs of directions, in which grazing views count less. The mean difference \
-         of a texel from the centre of its cluster is <b>{error:.3}</b>, and from the measured texel that \
-         represents the cluster {:.3}; a difference of 1 is just visible.</p>",
+         found in {} passes over the texels. Texels are compared by their lightness L* under all pairs of \
+         directions; grazing views count less. The mean difference of a texel from the centre of its cluster \
+         is <b>{error:.3}</b>, and from the measured texel that represents the cluster {:.3}. A difference of \
+         1 is just visible.</p>",
         report.clusters,
         report.passes.len(),
-        report.single_texel_clusters,
         report.representative_lightness_error
     );
     let shots = vec![

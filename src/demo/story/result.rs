@@ -99,7 +99,8 @@ pub(super) fn likeness(figures: &Figures) -> Section {
     let intro = format!(
         "<p><b>Does every cluster keep its share?</b> In the tile, each cluster covers some share of the texels. \
          The surface of the default method agrees with these shares to <b>{:.0} %</b>, that of the paper's method to \
-         <b>{:.0} %</b> (100 % would be equal shares). Of the {} clusters, {} and {} are not used at all.</p>\
+         <b>{:.0} %</b> (100 % would be equal shares). Of the {} clusters, the default method leaves {} unused, \
+         the paper's method {}.</p>\
          <p><b>Are there patches that the material does not have?</b> Take the mean brightness of each square of \
          {BLOCK} × {BLOCK} texels. It varies <b>{:.2}</b> times as much as in the tile with the default method, and \
          <b>{:.2}</b> times with the paper's. Above 1, a surface has larger patches or streaks than the material.</p>\

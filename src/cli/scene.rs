@@ -34,7 +34,8 @@ pub(super) struct SceneArgs {
     /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Show a part of the endless surface of a model, without storing it; --window says which part, and may be negative
+    /// Show a part of the endless surface of a model, without storing it; --window says which part, and its x and y may
+    /// be negative
     #[arg(long)]
     plane: bool,
     /// Seed of the endless surface

@@ -75,9 +75,8 @@ impl Check {
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
             // One that was made by an older version, or crafted, may not say how it was read.
-            let attributes = measurement.attributes()?;
-            let reading = attributes.get("recipe").and_then(|recipe| recipe.get("reading")).cloned();
-            report.beside(&serde_json::from_value(reading.unwrap_or_default()).unwrap_or_default());
+            let reading = measurement.recipe().reading.clone();
+            report.beside(&serde_json::from_value(reading).unwrap_or_default());
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;

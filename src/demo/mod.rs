@@ -208,7 +208,7 @@ fn analyse(
     times: &mut Times,
     context: &Context<'_>,
 ) -> Result<()> {
-    let found = |stage: Stage| Model::open(model).and_then(|m| m.stage(stage)).is_ok_and(|s| s.is_some());
+    let found = |stage: Stage| Model::open(model).is_ok_and(|model| model.has(stage).unwrap_or(false));
     let (measurement, model) = (measurement.to_owned(), model.to_owned());
     times.time("tile", found(Stage::Tile), || {
         let (measurement, model) = (measurement.clone(), model.clone());

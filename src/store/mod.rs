@@ -17,7 +17,8 @@ use serde_json::{Map, Value, json};
 use crate::disk::lock::Lock;
 use crate::disk::temporary::{Temporary, remove_folder};
 use crate::error::{Error, Result};
-use crate::run::{Context, Existing, recipe};
+use crate::run::recipe::{self, Made};
+use crate::run::{Context, Existing};
 use crate::zarr::{FORMAT, Store, metadata};
 
 /// Name of the lock that whoever writes a store by a recipe shares with others who do.
@@ -94,10 +95,10 @@ impl Store {
             attributes.extend(more);
         }
         let found = self.begin(kind, attributes, context)?;
-        recipe::expect_same(self.path(), &found, recipe)?;
+        Made::of(&found).expect(self.path(), recipe)?;
         let lock = Lock::share(self.path(), WRITING, context)?;
         // It may have been removed between.
-        recipe::expect_same(self.path(), &self.expect(kind)?, recipe)?;
+        Made::of(&self.expect(kind)?).expect(self.path(), recipe)?;
         self.sweep()?;
         Ok(lock)
     }
@@ -107,7 +108,7 @@ impl Store {
         let is_another = || -> Result<bool> {
             match self.attributes() {
                 Ok(None) => Ok(false),
-                Ok(Some(_)) => Ok(recipe::expect_same(self.path(), &self.expect(kind)?, recipe).is_err()),
+                Ok(Some(_)) => Ok(Made::of(&self.expect(kind)?).expect(self.path(), recipe).is_err()),
                 Err(_) if self.claimed_kind().as_deref() == Some(kind) => Ok(true),
                 Err(error) => Err(error),
             }

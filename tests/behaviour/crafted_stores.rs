@@ -46,8 +46,8 @@ fn patch(store: &Path, array: &str, patches: &[(usize, &[u8])]) {
 /// Declares a stage done again, with the checksums that its arrays have now.
 fn declare(model: &Path, stage: Stage, context: &Context<'_>) -> Result<()> {
     let model = Model::open(model)?;
-    let entry = model.stage(stage)?.unwrap();
-    model.finish(stage, &entry["recipe"], &entry["report"], context)
+    let recipe = model.recipe_text(stage)?.unwrap();
+    model.finish(stage, &recipe, &model.report::<Value>(stage)?, context)
 }
 
 #[test]

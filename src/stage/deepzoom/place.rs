@@ -13,6 +13,7 @@ use crate::disk::output::{expect_outside_stores, holds, settle};
 use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
+use crate::run::recipe::Made;
 use crate::run::{Context, Existing, recipe};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::zarr::storage::MappedStorage;
@@ -82,7 +83,7 @@ impl Place {
             _ => error,
         })?;
         if let Some(found) = state {
-            return recipe::expect_same(&self.description, &found, recipe);
+            return Made::of(&found).expect(&self.description, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|entry| temporary::is_temporary(&entry.path()) || is_lock(&entry.path()))

@@ -39,7 +39,7 @@ pub(super) struct Fit {
 
 #[derive(Args)]
 pub(super) struct FitOptions {
-    /// CarKind of random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
+    /// Kind of random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
     #[arg(long, value_enum, default_value = "3d")]
     mrf: CarKind,
     /// Number of levels of the pyramid [default: 1 to 5, the one that keeps the autocovariance best]

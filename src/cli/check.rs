@@ -16,30 +16,31 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
 
-/// Find faults in a measurement: swapped or mirrored directions, wrong curves, black, duplicate or misplaced images
+/// Look for mistakes of a measurement: swapped or mirrored directions, a wrong gamma, black, duplicate or misplaced
+/// images
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf check wood.zarr
   btf check UBO_WOOD256.zip --picture wood.png
-  btf check felt.btf --azimuth mirrored             does this option repair it?
+  btf check felt.btf --azimuth mirrored             see whether this option repairs it
   btf check archives/*                              one line each, and a count
 The exit code is 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
-    /// Measurements and archives; with several, each gets one line
+    /// Measurements and archives; if there are several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Take the archives for pieces of one measurement
+    /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Also draw what was measured on one sheet: .png, .jpg, .webp or .tif
+    /// Also write one picture with all that was found: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print everything as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 impl Check {

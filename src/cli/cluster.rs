@@ -15,34 +15,35 @@ use super::{Console, bytes_text, number};
 
 #[derive(Args)]
 pub(super) struct ClusterOptions {
-    /// Number of clusters, n_c [default: 256, or as many as the tile has texels]
+    /// Number of clusters [default: 256, or as many as the tile has texels]
     #[arg(long, group = "amount", value_parser = number::count)]
     clusters: Option<usize>,
-    /// Instead: the fewest clusters with a mean weighted |dL*| of at most this
+    /// Instead of --clusters: as few as leave a mean error of at most this, in units of lightness L*
     #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
     error: Option<f64>,
-    /// Instead: as many as make the model this many times smaller than the raw measurement
+    /// Instead of --clusters: as many as make the model N times smaller than the raw measurement
     #[arg(long, group = "amount", value_name = "N", value_parser = number::positive)]
     ratio: Option<f64>,
-    /// Centre of a cluster
+    /// What the centre of a cluster is
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
-    /// Most passes over the texels
+    /// Stop after this many passes over the texels
     #[arg(long, default_value_t = Limits::default().passes)]
     passes: usize,
-    /// Stop when a pass improves the objective by less than this share
+    /// Stop when a pass lowers the error by less than this share
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
     tolerance: f64,
-    /// How to find the first centres [default: from all texels if they fit in 192 MiB, else sample]
+    /// Where the first centres come from [default: all texels if they fit in 192 MiB, otherwise a sample]
     #[arg(long, value_enum)]
     first: Option<FirstName>,
-    /// Texels in the sample [default: as many as fit in 192 MiB; for mini-batches 16384, or eight for each cluster]
+    /// Number of texels in the sample [default: as many as fit in 192 MiB; for mini-batches 16384, or eight for each
+    /// cluster if that is more]
     #[arg(long, value_name = "TEXELS")]
     sample: Option<usize>,
-    /// Try so many sets of first centres, and go on with the best
+    /// Try N sets of first centres, and go on with the best
     #[arg(long, default_value_t = 1, value_name = "N")]
     restarts: u32,
-    /// Begin no further pass after so many seconds
+    /// Begin no further pass after this many seconds
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile contains this one
@@ -52,7 +53,7 @@ pub(super) struct ClusterOptions {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Centre {
-    /// The median in each direction, with the least sum of absolute differences
+    /// The median for each pair of directions, which has the least sum of absolute differences
     Median,
     /// The mean, as in ordinary k-means
     Mean,
@@ -76,18 +77,18 @@ enum StepName {
     Reduce,
 }
 
-/// Group the texels of a model's tile into clusters whose BRDFs are alike
+/// Sort the texels of a model's tile into clusters of similar BRDFs
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf cluster wood.zarr wood.model.zarr --clusters 400
-  btf cluster wood.zarr wood.model.zarr --error 1.5         the fewest clusters with this mean |dL*|
-  btf cluster wood.zarr wood.model.zarr --ratio 200         a two hundredth of the measurement's size
+  btf cluster wood.zarr wood.model.zarr --error 1.5         as few clusters as leave this mean error
+  btf cluster wood.zarr wood.model.zarr --ratio 200         200 times smaller than the measurement
   btf cluster wood.zarr second.model.zarr --clusters-of wood.model.zarr
 Cluster the whole plane once, and use its clusters for any tile that is cut from it:
   btf tile wood.zarr plane.model.zarr --tile none && btf cluster wood.zarr plane.model.zarr
   btf model wood.zarr wood.model.zarr --clusters-of plane.model.zarr
-Many processes, the same bytes (exit code 66: a step before this one is not finished):
+Share the work between processes (exit code 66: a step before this one is not finished):
   btf cluster wood.zarr plane.model.zarr --step prepare
   btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
   btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
@@ -103,13 +104,13 @@ pub(super) struct Cluster {
     options: ClusterOptions,
     #[command(flatten)]
     seed: Seed,
-    /// Do only one step, where many processes share the work
+    /// Do only one step, so that many processes share the work
     #[arg(long, value_enum, conflicts_with_all = ["clusters_of", "time"])]
     step: Option<StepName>,
     /// Number of the pass, from 0; a pass that is finished is not done again [default: the latest]
     #[arg(long, requires = "step", value_name = "N")]
     pass: Option<usize>,
-    /// Assign only part K of N of the pass
+    /// Assign only part K of N of the texels, K from 0
     #[arg(long, requires = "step", value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing

@@ -13,7 +13,7 @@ use clap::Args;
 use super::Console;
 use super::table::{row, table};
 
-/// Compare a model with its measurement over the tile: errors in lightness and colour
+/// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -27,13 +27,13 @@ pub(super) struct Compare {
     /// or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Light of the picture: theta,phi in degrees
+    /// Direction of the light, theta,phi in degrees: theta from the normal, phi counter-clockwise from the right
     #[arg(long, default_value = "15,0", allow_hyphen_values = true)]
     light: Direction,
-    /// View of the picture
+    /// Direction of the view, theta,phi in degrees
     #[arg(long, default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// Print the figures as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }

@@ -35,7 +35,7 @@ pub(super) struct Deepzoom {
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
-    /// Print what was done as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }

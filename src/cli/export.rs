@@ -9,31 +9,32 @@ use clap::{Args, ValueEnum};
 use super::deepzoom::Deepzoom;
 use super::{Console, bytes_text, found};
 
-/// Write a measurement as an archive (zip, EXR, PNG, HDF5, npy, Bonn), or a picture as Deep Zoom tiles
+/// Write a measurement for other programs (zip, EXR, PNG, HDF5, npy, Bonn), or a picture to zoom into (Deep Zoom)
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  btf export wood.zarr wood.npy                       for numpy: [view, light, y, x, channel], and two arrays of directions
+  btf export wood.zarr wood.npy                       for numpy, with two arrays of directions
   btf export wood.zarr wood.h5                        for h5py and MATLAB
   btf export wood.zarr wood-exr --to exr              a folder of linear pictures
   btf export wood.zarr wood.zip --quality 95          JPEGs named as in UBO2003 (lossy)
-  btf export wood.zarr wood.btf --rank 100            for viewers of Bonn's containers; without --rank it is exact, and as large as the raw data
+  btf export wood.zarr wood.btf --rank 100            for Bonn's viewers; exact, but large, without --rank
   btf export wood-4k.zarr wood.dzi --deepzoom --light 60,90 --format jpeg
                                                       tiles for OpenSeadragon and others, and wood.html to look at them
-Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.
-Tiles show measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the same command again.")]
+Lossless are npy, PNG, HDF5, and EXR and Bonn's containers of halves or floats: importing them gives the same samples.
+Deep Zoom shows measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the
+same command again.")]
 pub(super) struct Export {
     /// The measurement; with --deepzoom also a model or an enlargement
     store: PathBuf,
     /// The file or folder to make
     output: PathBuf,
-    /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF, .dzi Deep Zoom]
+    /// Format [default: by the ending of the name: .zip (UBO2003), .npy, .h5 or .hdf5, .btf (DFMF), .dzi (Deep Zoom)]
     #[arg(long, value_enum, conflicts_with = "deepzoom")]
     to: Option<FormatName>,
-    /// Components to keep in a Bonn container [default: all, which is exact]
+    /// Number of components to keep in a Bonn container [default: all, which is exact]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     rank: Option<u32>,
-    /// JPEG quality [default: 100, for tiles 90]
+    /// Quality of JPEGs, 1 to 100 [default: 100, for Deep Zoom tiles 90]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
     #[command(flatten)]

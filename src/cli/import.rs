@@ -15,7 +15,7 @@ use super::outputs::wanted_twice;
 use super::source::SourceArgs;
 use super::{Console, bytes_text, number};
 
-/// Convert archives into measurements, from any format that `btf info` lists; one archive or hundreds
+/// Convert archives of any common format into stores; one archive or hundreds
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -24,29 +24,30 @@ Examples:
   btf import tv*.zip wood.zarr                    one measurement in many pieces; the store comes last
   btf import *.zip *.btf --into stores            many archives, one store each; a bad one does not stop the others
   btf import felt.btf --shard 3/8                 the fourth of eight parts, for an array of jobs
-  btf import wall.btf --codec predictive          a tenth to a fifth smaller; zarr-python needs our module to read it
+  btf import wall.btf --codec predictive          a tenth to a fifth smaller
 If it is interrupted, run the same command again: it goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives, and last the measurement to make, if that name ends in .zarr and --into is not given
+    /// The archive, then the store to make [default: the archive's name with .zarr]; or many archives. A last name that
+    /// ends in .zarr is the store, and all names before it are pieces of one measurement
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
-    /// Make one measurement for each archive, in this folder [default: the current folder]
+    /// Make one store for each archive, in this folder [default: the current folder]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Reflectance that counts as white, L* = 100
+    /// Reflectance that counts as white, L* = 100; less for very dark materials
     #[arg(long, default_value_t = 1.0, value_parser = number::white)]
     white: f64,
-    /// How to pack samples: `stock` opens in zarr-python as it is, `predictive` is smaller and faster
+    /// How to pack samples: `predictive` is smaller and faster, but zarr-python needs a module to read it
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
     codec: Chain,
-    /// Import part K of N of the views (K from 0)
+    /// Import only part K of N of the views, K from 0, so that N jobs share the work, in any order
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// One archive and its store.

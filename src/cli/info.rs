@@ -19,7 +19,7 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json, bytes_text};
 
-/// Show what an archive or a store holds, and how large the store of an archive will be
+/// Show what an archive or a store holds, and how large an archive will be once imported
 #[derive(Args)]
 #[command(after_help = "\
 Archives are recognised by their content:
@@ -33,17 +33,17 @@ Examples:
   btf info wood.model.zarr --json
   btf info archives/*                               one line each, and a count")]
 pub(super) struct Info {
-    /// Archives and stores; with several, each gets one line
+    /// Archives and stores; if there are several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Take the archives for pieces of one measurement
+    /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print it as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// What an archive holds, and how large its store will be.

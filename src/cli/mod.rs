@@ -50,15 +50,16 @@ use serde_json::Value;
 
 const EXAMPLES: &str = "\
 Examples:
-  btf demo                                      the whole method on a synthetic material, with pictures
-  btf import UBO_WOOD256.zip wood.zarr          an archive becomes a measurement
-  btf model wood.zarr wood.model.zarr           a measurement becomes a model
+  btf demo                                      run the whole method on a synthetic material, with pictures
+  btf import UBO_WOOD256.zip wood.zarr          make a store of an archive
+  btf model wood.zarr wood.model.zarr           make a model of the store
   btf enlarge wood.model.zarr big.zarr --size 4096x4096
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
 Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or a result of other options, 66 input not there yet,
-74 input/output, 75 stopped early (run the same command again).";
+Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else is at the place of the result;
+66 input not there yet; 74 the system refuses to read or write; 75 stopped on request (run the same command again).
+The book is in docs/; docs/README.md says where to begin.";
 
 /// Why something could not be written to standard output: the program must not end as if it had been told.
 static UNTOLD: OnceLock<std::io::Error> = OnceLock::new();
@@ -68,7 +69,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"
 /// More threads than any machine has cores that share a memory.
 const MOST_THREADS: i64 = 1024;
 
-/// Turns a measured BTF (bidirectional texture function) into a small model, and a model into textures of any size.
+/// Turns a measured BTF (bidirectional texture function) into a small model, and the model into surfaces of any size.
 #[derive(Parser)]
 #[command(name = "btf", version = VERSION, after_help = EXAMPLES, subcommand_help_heading = "Commands")]
 struct Cli {
@@ -92,8 +93,7 @@ struct Common {
     /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace results that exist, and redo what was made with other options. Without it, nothing that exists is ever
-    /// replaced
+    /// Replace results that exist, also those of other options. Without it, nothing that exists is ever replaced
     #[arg(long, global = true)]
     force: bool,
     /// Print nothing but errors

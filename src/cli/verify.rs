@@ -26,21 +26,22 @@ Examples:
   btf verify stores/*.zarr                          one line each, and a count
 The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
-    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); with several, each
-    /// gets one line
+    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); if there are
+    /// several, each gets one line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
-    /// The model of an enlargement [default: where it was when the enlargement was made, or beside it]
+    /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
+    /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// The archive that the measurement was made of; repeat the option for each piece
+    /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print the report as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 impl Verify {

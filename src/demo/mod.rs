@@ -1,4 +1,4 @@
-//! The whole method on a made material, and a page that tells the story of the run.
+//! The whole method on a synthetic material, and a page that explains the run with its pictures and figures.
 //!
 //! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
 //! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.

@@ -27,7 +27,7 @@ pub trait Recipe: Serialize + DeserializeOwned {
     /// The recipe as it is stored.
     ///
     /// # Errors
-    /// [`crate::Kind::Internal`] for settings that are no JSON object.
+    /// [`crate::ErrorKind::Internal`] for settings that are no JSON object.
     fn to_value(&self) -> Result<Value> {
         let failed = |what: &str| Error::internal(format!("recipe of {}: {what}", Self::STAGE));
         let mut recipe = serde_json::to_value(self).map_err(|error| failed(&error.to_string()))?;

@@ -141,7 +141,7 @@ pub struct ClusterReport {
     /// Passes over mini-batches that grew, before these.
     #[serde(default)]
     pub batches: Vec<BatchPass>,
-    /// Texels of the sample that the first approach was made on; 0 where all texels went into memory.
+    /// Texels of the sample that the initial clustering was made on; 0 where all texels went into memory.
     pub sample_texels: usize,
     /// Passes over the sample.
     pub sample_passes: Vec<Pass>,
@@ -172,7 +172,8 @@ pub struct ClusterReport {
 #[serde(rename_all = "lowercase")]
 pub enum Ended {
     /// Nothing moved, or the objective fell by less than the tolerance.
-    Settled,
+    #[serde(rename = "settled")]
+    Converged,
     /// There were as many as allowed.
     Passes,
     /// The time was over.

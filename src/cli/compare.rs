@@ -12,10 +12,10 @@ use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
-/// Compare a model with its measurement over the tile: errors in lightness and colour
+/// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -29,26 +29,26 @@ pub(super) struct Compare {
     /// or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Light of the picture: theta,phi in degrees
+    /// Direction of the light, theta,phi in degrees: theta from the normal, phi counter-clockwise from the right
     #[arg(long, requires = "picture", default_value = "15,0", allow_hyphen_values = true)]
     light: Direction,
-    /// View of the picture
+    /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// Print the figures as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl Compare {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
         let report = compare::run(&model, &measurement, context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
             for errors in report.elevations.iter().chain([&report.all]) {
@@ -61,13 +61,13 @@ impl Compare {
                     format!("{:.2}", errors.ciede2000_95)
                 ]);
             }
-            tell.text(&table(&rows));
-            tell.line(format!(
+            console.text(&table(&rows));
+            console.line(format!(
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
             if report.all.hues_are_lost() {
-                tell.line(format!(
+                console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
                     report.all.ciede2000, report.all.lightness
@@ -75,7 +75,7 @@ impl Compare {
             }
             if report.all.samples_left_out > 0 {
                 let count = counted(report.all.samples_left_out, "sample");
-                tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
+                console.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
         match &self.picture {
@@ -84,7 +84,7 @@ impl Compare {
                 if !self.json {
                     let description = measurement.description();
                     let measured = [&description.views[..], &description.lights];
-                    tell.notes(&image::notes_of_directions(measured, self.view, self.light));
+                    console.notes(&image::notes_of_directions(measured, self.view, self.light));
                 }
                 Ok(())
             }

@@ -15,9 +15,9 @@ use super::each::{Ended, Line, each};
 use super::given::kind_at;
 use super::outputs::wanted_twice;
 use super::source::SourceArgs;
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
-/// Convert archives into measurements, from any format that `btf info` lists; one archive or hundreds
+/// Convert archives of any common format into stores; one archive or hundreds
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -26,29 +26,30 @@ Examples:
   btf import tv*.zip wood.zarr                    one measurement in many pieces; the store comes last
   btf import *.zip *.btf --into stores            many archives, one store each; a bad one does not stop the others
   btf import felt.btf --shard 3/8                 the fourth of eight parts, for an array of jobs
-  btf import wall.btf --codec predictive          a tenth to a fifth smaller; zarr-python needs our module to read it
+  btf import wall.btf --codec predictive          a tenth to a fifth smaller
 If it is interrupted, run the same command again: it goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives, and last the measurement to make, if that name ends in .zarr and --into is not given
+    /// The archive, then the store to make [default: the archive's name with .zarr]; or many archives. A last name that
+    /// ends in .zarr is the store, and all names before it are pieces of one measurement
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
-    /// Make one measurement for each archive, in this folder [default: the current folder]
+    /// Make one store for each archive, in this folder [default: the current folder]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Reflectance that counts as white, L* = 100
+    /// Reflectance that counts as white, L* = 100; less for very dark materials
     #[arg(long, default_value_t = 1.0, value_parser = number::white)]
     white: f64,
-    /// How to pack samples: `stock` opens in zarr-python as it is, `predictive` is smaller and faster
+    /// How to pack samples: `predictive` is smaller and faster, but zarr-python needs a module to read it
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
     codec: Chain,
-    /// Import part K of N of the views (K from 0)
+    /// Import only part K of N of the views, K from 0, so that N jobs share the work, in any order
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// One archive and its store.
@@ -58,12 +59,12 @@ struct Job {
 }
 
 impl Import {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         let jobs = self.jobs()?;
-        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, tell) };
-        if let Some((description, report, remarks)) = self.import(job, context, tell)? {
-            tell.line(format!("{}: {}", job.store.display(), told(&description, &report)));
-            remarks.iter().for_each(|remark| tell.line(format!("  {remark}")));
+        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, console) };
+        if let Some((description, report, remarks)) = self.import(job, context, console)? {
+            console.line(format!("{}: {}", job.store.display(), summary(&description, &report)));
+            remarks.iter().for_each(|remark| console.line(format!("  {remark}")));
         }
         Ok(Ended::Done)
     }
@@ -116,7 +117,7 @@ impl Import {
         &self,
         job: &Job,
         context: &Context<'_>,
-        tell: Tell,
+        console: Console,
     ) -> Result<Option<(Description, Report, Vec<String>)>> {
         if let Some((store, kind)) = job.pieces.iter().find_map(|piece| Some((piece, kind_at(piece)?))) {
             let what = format!("{} is a store already (a {kind}), expected an archive", store.display());
@@ -140,7 +141,7 @@ impl Import {
         };
         let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
-            tell.plan(&plan.summary())?;
+            console.plan(&plan.summary())?;
             return Ok(None);
         }
         let report = plan.run(context)?;
@@ -162,7 +163,7 @@ impl Import {
     }
 
     /// Imports many archives under one bar; those that fail do not stop the others.
-    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    fn import_all(&self, jobs: &[Job], context: &Context<'_>, console: Console) -> Result<Ended> {
         // Counted before anything is imported: opening an archive is cheap.
         let images = |job: &Job| {
             let contents = self.source.open(&job.pieces).map(|source| {
@@ -178,11 +179,11 @@ impl Import {
             .with_memory(context.memory())
             .with_existing(context.existing);
         let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
-        each(jobs, name, false, context, tell, |job| {
+        each(jobs, name, false, context, console, |job| {
             context.progress.remark(&name(job));
-            let report = self.import(job, &inner, tell)?;
+            let report = self.import(job, &inner, console)?;
             let told = report.map(|(description, report, remarks)| {
-                std::iter::once(told(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
+                std::iter::once(summary(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
             });
             let store = job.store.display();
             Ok((Line::Text(told.map_or(format!("{store}"), |told| format!("{store}: {told}"))), None))
@@ -190,7 +191,7 @@ impl Import {
     }
 }
 
-fn told(description: &Description, report: &Report) -> String {
+fn summary(description: &Description, report: &Report) -> String {
     let mut text = format!(
         "{} x {} of {}, {} raw; {} written, {} found done, {} clipped at white",
         counted(description.views.len(), "view"),

@@ -18,9 +18,9 @@ use super::each::{Ended, Line, each};
 use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json, bytes_text};
+use super::{Console, as_json, bytes_text};
 
-/// Show what an archive or a store holds, and how large the store of an archive will be
+/// Show what an archive or a store holds, and how large an archive will be once imported
 #[derive(Args)]
 #[command(after_help = "\
 Archives are recognised by their content:
@@ -34,17 +34,17 @@ Examples:
   btf info wood.model.zarr --json
   btf info archives/*                               one line each, and a count")]
 pub(super) struct Info {
-    /// Archives and stores; with several, each gets one line
+    /// Archives and stores; if there are several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Take the archives for pieces of one measurement
+    /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print it as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// What an archive holds, and how large its store will be.
@@ -72,10 +72,10 @@ enum Told {
 type Rows = Vec<Vec<String>>;
 
 impl Info {
-    pub(super) fn run(&self, given: &Given, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         if self.paths.len() > 1 && !self.pieces {
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, self.json, context, tell, |path| {
+            return each(&self.paths, name, self.json, context, console, |path| {
                 let told = self.look(std::slice::from_ref(path), given, context)?;
                 let line =
                     if self.json { Line::Json(as_json(&told)?) } else { Line::Text(in_short(&rows(&told))) };
@@ -84,9 +84,9 @@ impl Info {
         }
         let told = self.look(&self.paths, given, context)?;
         if self.json {
-            tell.plan(&as_json(&told)?)?;
+            console.plan(&as_json(&told)?)?;
         } else {
-            tell.text(&table(&rows(&told)));
+            console.text(&table(&rows(&told)));
         }
         Ok(Ended::Done)
     }

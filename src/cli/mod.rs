@@ -39,7 +39,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use btfkit::disk::output::Made;
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::budget::{Allowance, cannot_start, expect_stack, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::run::{Context, Existing};
@@ -52,15 +52,16 @@ use serde_json::Value;
 
 const EXAMPLES: &str = "\
 Examples:
-  btf demo                                      the whole method on a synthetic material, with pictures
-  btf import UBO_WOOD256.zip wood.zarr          an archive becomes a measurement
-  btf model wood.zarr wood.model.zarr           a measurement becomes a model
+  btf demo                                      run the whole method on a synthetic material, with pictures
+  btf import UBO_WOOD256.zip wood.zarr          make a store of an archive
+  btf model wood.zarr wood.model.zarr           make a model of the store
   btf enlarge wood.model.zarr big.zarr --size 4096x4096
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
 Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or a result of other options, 66 input not there yet,
-74 input/output, 75 stopped early (run the same command again).";
+Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else is at the place of the result;
+66 input not there yet; 74 the system refuses to read or write; 75 stopped on request (run the same command again).
+The book is in docs/; docs/README.md says where to begin.";
 
 /// Why something could not be written to standard output: the program must not end as if it had been told.
 static UNTOLD: OnceLock<std::io::Error> = OnceLock::new();
@@ -70,7 +71,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"
 /// More threads than any machine has cores that share a memory.
 const MOST_THREADS: i64 = 1024;
 
-/// Turns a measured BTF (bidirectional texture function) into a small model, and a model into textures of any size.
+/// Turns a measured BTF (bidirectional texture function) into a small model, and the model into surfaces of any size.
 #[derive(Parser)]
 #[command(name = "btf", version = VERSION, after_help = EXAMPLES, subcommand_help_heading = "Commands")]
 struct Cli {
@@ -94,8 +95,7 @@ struct Common {
     /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace results that exist, and redo what was made with other options. Without it, nothing that exists is ever
-    /// replaced
+    /// Replace results that exist, also those of other options. Without it, nothing that exists is ever replaced
     #[arg(long, global = true)]
     force: bool,
     /// Print nothing but errors
@@ -140,7 +140,7 @@ enum Command {
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
     if let Err(error) = expect_stack() {
-        Tell { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
+        Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
         return ExitCode::from(exit_code(error.kind()));
     }
     let matches = help::command().try_get_matches();
@@ -165,7 +165,7 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Auto if std::io::stderr().is_terminal() => Box::new(progress::Bars::default()),
         ProgressStyle::Auto => Box::new(progress::Plain::default()),
     };
-    let tell = Tell {
+    let console = Console {
         quiet: cli.common.quiet,
         found: false,
         brief: false,
@@ -184,13 +184,13 @@ pub(crate) fn run() -> ExitCode {
             let context = context.with_memory(memory);
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
-        .inspect(|context| obey_while_computing(&stop, context.computing(), tell, cli.command.goes_on()))
+        .inspect(|context| obey_while_computing(&stop, context.computing(), console, cli.command.goes_on()))
         .and_then(|context| {
             // The others say themselves what they need, all of it at once.
             if !cli.command.says_what_it_needs() {
                 context.require("the program itself", 0)?;
             }
-            cli.command.run(&given, &context, tell)
+            cli.command.run(&given, &context, console)
         });
     progress.end();
     let result = result.and_then(|ended| match UNTOLD.get() {
@@ -203,8 +203,9 @@ pub(crate) fn run() -> ExitCode {
         Ok(Ended::Done) => ExitCode::SUCCESS,
         Ok(Ended::Failed(kind)) => ExitCode::from(exit_code(kind)),
         Err(error) => {
-            let error = if error.kind() == Kind::Stopped { stopped(cli.command.goes_on()) } else { error };
-            tell.failure(None, &error);
+            let error =
+                if error.kind() == ErrorKind::Stopped { stopped(cli.command.goes_on()) } else { error };
+            console.failure(None, &error);
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -241,7 +242,7 @@ fn explain_aborts(json: bool) {
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Ends the program at the first signal while it computes what cannot look for one: there is nothing to lose but time.
-fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell: Tell, goes_on: bool) {
+fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, console: Console, goes_on: bool) {
     let stop = Arc::clone(stop);
     // Without a thread for it the second signal ends the program.
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
@@ -249,7 +250,7 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell
             std::thread::sleep(LOOK);
             if stop.load(Ordering::SeqCst) && computing.load(Ordering::SeqCst) {
                 let error = stopped(goes_on);
-                tell.failure(None, &error);
+                console.failure(None, &error);
                 std::process::exit(i32::from(exit_code(error.kind())));
             }
         }
@@ -279,47 +280,47 @@ impl Command {
         }
     }
 
-    fn run(&self, given: &Given, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         let single = match self {
-            Self::Info(command) => return command.run(given, context, tell),
-            Self::Check(command) => return command.run(given, context, tell),
-            Self::Import(command) => return command.run(context, tell),
-            Self::Verify(command) => return command.run(given, context, tell),
-            Self::Model(command) => return command.run(context, tell),
-            Self::Enlarge(command) => return command.run(context, tell),
-            Self::Demo(command) => command.run(context, tell),
-            Self::Sample(command) => command.run(context, tell),
-            Self::Export(command) => command.run(given, context, tell),
-            Self::Tile(command) => command.run(context, tell),
-            Self::Cluster(command) => command.run(given, context, tell),
-            Self::Curve(command) => command.run(context, tell),
-            Self::Normals(command) => command.run(context, tell),
-            Self::Fit(command) => command.run(context, tell),
-            Self::Appearance(command) => command.run(context, tell),
-            Self::Compare(command) => command.run(context, tell),
-            Self::Image(command) => command.run(given, context, tell),
-            Self::Judge(command) => command.run(context, tell),
-            Self::Completions(command) => command.run(tell),
-            Self::Man(command) => command.run(tell),
+            Self::Info(command) => return command.run(given, context, console),
+            Self::Check(command) => return command.run(given, context, console),
+            Self::Import(command) => return command.run(context, console),
+            Self::Verify(command) => return command.run(given, context, console),
+            Self::Model(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(context, console),
+            Self::Demo(command) => command.run(context, console),
+            Self::Sample(command) => command.run(context, console),
+            Self::Export(command) => command.run(given, context, console),
+            Self::Tile(command) => command.run(context, console),
+            Self::Cluster(command) => command.run(given, context, console),
+            Self::Curve(command) => command.run(context, console),
+            Self::Normals(command) => command.run(context, console),
+            Self::Fit(command) => command.run(context, console),
+            Self::Appearance(command) => command.run(context, console),
+            Self::Compare(command) => command.run(context, console),
+            Self::Image(command) => command.run(given, context, console),
+            Self::Judge(command) => command.run(context, console),
+            Self::Completions(command) => command.run(console),
+            Self::Man(command) => command.run(console),
         };
         single.map(|()| Ended::Done)
     }
 }
 
-fn exit_code(kind: Kind) -> u8 {
+fn exit_code(kind: ErrorKind) -> u8 {
     match kind {
-        Kind::Internal => 1,
-        Kind::Usage => 2,
-        Kind::Input | Kind::Recipe => 65,
-        Kind::Missing => 66,
-        Kind::Io => 74,
-        Kind::Stopped => 75,
+        ErrorKind::Internal => 1,
+        ErrorKind::Usage => 2,
+        ErrorKind::Input | ErrorKind::Recipe => 65,
+        ErrorKind::Missing => 66,
+        ErrorKind::Io => 74,
+        ErrorKind::Stopped => 75,
     }
 }
 
 /// Where results are told.
 #[derive(Clone, Copy)]
-struct Tell {
+struct Console {
     quiet: bool,
     /// What is told was found done.
     found: bool,
@@ -329,7 +330,7 @@ struct Tell {
     json: bool,
 }
 
-impl Tell {
+impl Console {
     /// Tells nothing but failures.
     fn silent(self) -> Self {
         Self { quiet: true, ..self }

@@ -1,6 +1,6 @@
 //! What `--memory` allows: the program's own share, what a stage needs at least, and what the system leaves.
 
-use crate::error::{Error, Kind, NO_THREADS, Result};
+use crate::error::{Error, ErrorKind, NO_THREADS, Result};
 use crate::words::counted;
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
@@ -32,7 +32,8 @@ impl Allowance {
     /// Checks what cannot be done without against what is allowed. `otherwise` is what else helps, if anything does.
     ///
     /// # Errors
-    /// With what it needs and what to do: [`Kind::Usage`], or [`Kind::Internal`] where the system leaves no more.
+    /// With what it needs and what to do: [`ErrorKind::Usage`], or [`ErrorKind::Internal`] where the system leaves no
+    /// more.
     pub fn require(self, what: &str, needed: u64, otherwise: &str) -> Result<()> {
         let needed = needed.max(OWN_BYTES);
         if needed <= self.bytes {
@@ -42,7 +43,7 @@ impl Allowance {
         let found = format!("{what} takes {mib} MiB of memory, {} allowed", amount(self.bytes));
         let or = if otherwise.is_empty() { String::new() } else { format!("; or {otherwise}") };
         Err(if self.by_system {
-            Error::new(Kind::Internal, format!("{found} by the limit of the address space"))
+            Error::new(ErrorKind::Internal, format!("{found} by the limit of the address space"))
                 .hint(format!("raise that limit (ulimit -v){or}"))
         } else {
             Error::usage(found).hint(match self.enough.div_ceil(1 << 20) {
@@ -67,7 +68,8 @@ fn amount(bytes: u64) -> String {
 
 /// The error of threads that the system does not start.
 pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
-    Error::new(Kind::Io, format!("cannot start {}: {error}", counted(threads, "thread"))).hint(NO_THREADS)
+    Error::new(ErrorKind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
+        .hint(NO_THREADS)
 }
 
 /// Bytes that the process may still map where its address space is limited (`ulimit -v`); half of what is left, since
@@ -82,7 +84,7 @@ pub fn address_space_left() -> Option<u64> {
 /// Checks that the main thread has a stack to work on (`ulimit -s`): without one the program would end without a word.
 ///
 /// # Errors
-/// [`Kind::Internal`].
+/// [`ErrorKind::Internal`].
 #[allow(clippy::disallowed_methods)] // the system's own files
 pub fn expect_stack() -> Result<()> {
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
@@ -90,7 +92,7 @@ pub fn expect_stack() -> Result<()> {
         Some(bytes) if bytes < STACK_BYTES => {
             let found =
                 format!("the stack is limited to {} KiB, {} are needed", bytes >> 10, STACK_BYTES >> 10);
-            Err(Error::new(Kind::Internal, found).hint("raise that limit (ulimit -s 8192)"))
+            Err(Error::new(ErrorKind::Internal, found).hint("raise that limit (ulimit -s 8192)"))
         }
         _ => Ok(()),
     }
@@ -151,7 +153,7 @@ mod tests {
         let hint = by(1, false).unwrap_err().guidance().unwrap().to_owned();
         assert_eq!(hint, "--memory 70MiB, or more, allows it; or make it smaller");
         let error = by(64 << 20, true).unwrap_err();
-        assert_eq!(error.kind(), Kind::Internal);
+        assert_eq!(error.kind(), ErrorKind::Internal);
         let hint = error.guidance().unwrap();
         assert!(hint.contains("ulimit -v") && !hint.contains("--memory"), "{hint}");
         assert!(by(70 << 20, false).is_ok());

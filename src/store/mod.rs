@@ -17,7 +17,8 @@ use serde_json::{Map, Value, json};
 use crate::disk::lock::Lock;
 use crate::disk::temporary::{Temporary, remove_folder};
 use crate::error::{Error, Result};
-use crate::run::{Context, Existing, recipe};
+use crate::run::recipe::{self, Made};
+use crate::run::{Context, Existing};
 use crate::zarr::{FORMAT, Store, metadata};
 
 /// Whether a file of a store that a recipe makes is one that this program writes, by its way from the root.
@@ -113,7 +114,7 @@ impl Store {
     /// Returns a lock that keeps others from removing this one; it is to be held while the store is written.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's store lies there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's store lies there.
     pub fn begin_by_recipe(
         &mut self,
         kind: &str,
@@ -132,10 +133,10 @@ impl Store {
             attributes.extend(more);
         }
         let found = self.begin(kind, attributes, context)?;
-        recipe::expect_same(self.path(), &found, recipe)?;
+        Made::of(&found).expect(self.path(), recipe)?;
         let lock = Lock::share(self.path(), WRITING, context)?;
         // It may have been removed between.
-        recipe::expect_same(self.path(), &self.expect(kind)?, recipe)?;
+        Made::of(&self.expect(kind)?).expect(self.path(), recipe)?;
         self.sweep()?;
         Ok(lock)
     }
@@ -145,7 +146,7 @@ impl Store {
         let is_another = || -> Result<bool> {
             match self.attributes() {
                 Ok(None) => Ok(false),
-                Ok(Some(_)) => Ok(recipe::expect_same(self.path(), &self.expect(kind)?, recipe).is_err()),
+                Ok(Some(_)) => Ok(Made::of(&self.expect(kind)?).expect(self.path(), recipe).is_err()),
                 Err(_) if self.claimed_kind().as_deref() == Some(kind) => Ok(true),
                 Err(error) => Err(error),
             }
@@ -199,8 +200,8 @@ impl Store {
     /// The attributes of a store that must exist and be of this kind.
     ///
     /// # Errors
-    /// [`crate::Kind::Missing`] where there is nothing; [`crate::Kind::Input`] where there is something else, or a store
-    /// whose attributes were changed: says what it is, and what to do.
+    /// [`crate::ErrorKind::Missing`] where there is nothing; [`crate::ErrorKind::Input`] where there is something else,
+    /// or a store whose attributes were changed: says what it is, and what to do.
     pub fn expect(&self, kind: &str) -> Result<Map<String, Value>> {
         self.expect_one_of(&[kind])
     }

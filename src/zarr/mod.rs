@@ -164,7 +164,7 @@ impl Store {
     /// stays as it was.
     ///
     /// # Errors
-    /// [`crate::Kind::Input`], and those of reading the attributes.
+    /// [`crate::ErrorKind::Input`], and those of reading the attributes.
     pub(crate) fn expect_unchanged(&self) -> Result<()> {
         let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if seen.is_empty() {

@@ -103,7 +103,7 @@ impl Budget {
     }
 
     /// The same for as many clusters as are asked for, or as a search may go up to within memory.
-    pub(super) fn of_first_approach(plan: &Plan, context: &Context<'_>) -> Result<Self> {
+    pub(super) fn of_initial(plan: &Plan, context: &Context<'_>) -> Result<Self> {
         let mut clusters = plan.most_clusters;
         if let Amount::Error(_) = plan.options.amount {
             while clusters > 1 && Self::least(plan, clusters, context.threads) as u64 > context.memory_bytes {

@@ -14,12 +14,13 @@ use crate::error::{Error, Result};
 use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
 use crate::method::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use crate::run::budget::OWN_BYTES;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::run::{Context, Existing};
 use crate::shape::Size;
 use crate::stage::cluster::{expect_measurement, measurement_name};
 use crate::stage::{cluster, fit};
 use crate::store::measurement::Measurement;
+use crate::store::model::tile::TileRecipe;
 pub use crate::store::model::tile::TileReport as Report;
 use crate::store::model::{Model, Stage};
 use crate::store::origin;
@@ -74,16 +75,16 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let plane = measurement.description().size;
     let choice = options.choice.resolved(plane);
     range(choice, plane, &Lattice::None, false)?;
-    let mut recipe = json!({
-        "stage": "tile", "method": METHOD,
-        "measurement": measurement.digest(),
-        "tile": choice.to_string(),
-        "seed": options.seed,
-    });
     // Of other tiles only the report tells the lattice.
-    if matches!(choice, Choice::Cut | Choice::Largest) || options.lattice != LatticeChoice::Auto {
-        recipe["lattice"] = options.lattice.to_string().into();
-    }
+    let names_lattice =
+        matches!(choice, Choice::Cut | Choice::Largest) || options.lattice != LatticeChoice::Auto;
+    let recipe = TileRecipe {
+        measurement: measurement.digest().to_owned(),
+        tile: choice.to_string(),
+        seed: options.seed,
+        lattice: names_lattice.then(|| options.lattice.to_string()),
+    };
+    let recipe = recipe.to_value()?;
     Ok(Plan {
         measurement,
         model: options.model.clone(),

@@ -49,6 +49,7 @@
 )]
 
 mod angles;
+mod behind;
 pub mod big;
 pub mod bonn;
 mod catalogue;
@@ -59,6 +60,7 @@ mod error;
 mod fields;
 mod file_name;
 pub mod jpeg;
+mod labels;
 mod limits;
 pub mod mif;
 pub mod mlvq;

@@ -15,6 +15,7 @@
 //! half-transparent pixel is not in the file. Profiles, gamma and primaries are not applied.
 
 mod alpha;
+pub(crate) mod aspect;
 pub mod exr;
 mod foreign;
 mod hdr;
@@ -24,6 +25,7 @@ pub(crate) mod profile;
 mod size;
 mod tiff;
 mod wavelength;
+pub(crate) mod xmp;
 
 pub use foreign::foreign;
 pub use wavelength::wavelength_nm;
@@ -94,7 +96,8 @@ pub struct PictureHeader {
     /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an
     /// ICC profile, a gamma, code points, primaries, levels of black and white.
     pub profile: Option<String>,
-    /// What of an OpenEXR picture is read and what is not (layer, channels, window), a sentence each.
+    /// What of the picture is read and what is not (layer, channels, window, crop, pixels that are not square), a
+    /// sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -220,7 +223,7 @@ fn of_jpeg(header: jpeg::Header, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: header.orientation,
         profile: jpeg::profile::profile(bytes),
-        remarks: Vec::new(),
+        remarks: jpeg::profile::remarks(bytes),
     }
 }
 

@@ -96,7 +96,7 @@ fn of_header(header: &Header) -> PictureHeader {
         // The resolution line says where the first pixel lies, and is obeyed.
         orientation: 1,
         profile: header.profile.clone(),
-        remarks: Vec::new(),
+        remarks: header.remarks.clone(),
     }
 }
 

@@ -39,7 +39,7 @@ fn of_image(image: &chunks::ImageHeader, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: said.orientation(),
         profile: said.profile(),
-        remarks: Vec::new(),
+        remarks: said.remarks(),
     }
 }
 

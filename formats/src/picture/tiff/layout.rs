@@ -1,7 +1,7 @@
 //! What the samples of a TIFF are and where they lie in the file.
 
 use super::directory::{Directory, tag};
-use super::{colours, exif_colour_space, stack};
+use super::{colours, exif_colour_space, remarks, stack};
 use crate::picture::size::{Size, unsupported};
 use crate::picture::{grey_or_rgb, orientation};
 use crate::{Error, Limits, Result, SampleType};
@@ -78,6 +78,8 @@ pub(super) struct Layout {
     pub(super) orientation: u8,
     /// What is said of colours if it is not sRGB.
     pub(super) profile: Option<String>,
+    /// What of the picture is read and what is not, a sentence each.
+    pub(super) remarks: Vec<String>,
     rgb: bool,
     chunks: Chunks,
     /// Of the strips or tiles: offset and length.
@@ -152,6 +154,7 @@ impl Layout {
             predictor,
             orientation,
             profile: colours::said(&directory, exif_colour_space(bytes).ok().flatten(), most),
+            remarks: remarks::of(&directory, dimensions),
             rgb,
             chunks,
             places,

@@ -75,6 +75,7 @@ pub mod table;
 pub mod text;
 pub mod ubo2003;
 pub mod utia;
+pub mod words;
 pub mod zip;
 
 pub use angles::Angles;

@@ -20,6 +20,7 @@ pub use zero_bytes::ZeroBytes;
 
 use crate::reader::Reader;
 use crate::ubo2003::{Angles, directions_81};
+use crate::words::counted;
 use crate::{Contents, Direction, Images, Limits, Result, SampleType, Samples, request};
 
 /// Whether the first line is that of a database.
@@ -59,7 +60,7 @@ impl Database {
         let list: Vec<Direction> =
             directions.iter().map(|a| Direction::from_degrees(a.theta_deg(), a.phi_deg())).collect();
         let contents = Contents {
-            format: format!("MLVQ database, {} reflectance functions", header.functions_4d),
+            format: format!("MLVQ database, {}", counted(header.functions_4d, "reflectance function")),
             width: header.width,
             height: header.height,
             channels: ["R", "G", "B"].map(String::from).to_vec(),
@@ -84,11 +85,11 @@ fn assumptions(settled: Settled) -> Vec<String> {
     ];
     let Settled { known, by_rule } = settled;
     if known > 0 {
-        list.push(format!("{known} ambiguous zero bytes of the tables were settled as the caller said."));
+        list.push(format!("Ambiguous zero bytes of the tables, settled as the caller said: {known}."));
     }
     if by_rule > 0 {
         list.push(format!(
-            "{by_rule} ambiguous zero bytes of the tables were settled by continuity: each is its table's minimum or maximum, \
+            "Ambiguous zero bytes of the tables, settled by continuity: {by_rule}. Each is its table's minimum or maximum, \
              whichever fits its neighbours."
         ));
     }

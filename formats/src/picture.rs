@@ -30,6 +30,7 @@ pub(crate) mod xmp;
 pub use foreign::foreign;
 pub use wavelength::wavelength_nm;
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, SampleType, Samples, jpeg};
 
 /// The format of a picture.
@@ -67,7 +68,7 @@ impl Picture {
         let expected =
             u64::try_from(self.channels.len()).map_or(u64::MAX, |channels| pixels.saturating_mul(channels));
         if expected == 0 || u64::try_from(self.samples.len()).ok() != Some(expected) {
-            let found = format!("{} samples", self.samples.len());
+            let found = counted(self.samples.len(), "sample");
             let wanted = format!("{} x {} x {} and not 0", self.height, self.width, self.channels.len());
             return Err(Error::new(ErrorKind::Argument, found, wanted));
         }

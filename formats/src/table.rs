@@ -14,6 +14,7 @@
 use crate::fields::{Field, Forms};
 use crate::file_name::{inside_folder, parts_of, repeated};
 use crate::text::utf8;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Pair, Result};
 
 /// The rows of a table, in its order.
@@ -64,7 +65,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Table> {
     for record in reader.byte_records() {
         let record = record.map_err(|error| translate(&error, bytes))?;
         if u64::try_from(rows.len()).unwrap_or(u64::MAX) >= limits.max_entries {
-            let found = format!("more than {} rows", limits.max_entries);
+            let found = format!("more than {}", counted(limits.max_entries, "row"));
             return Err(Error::new(ErrorKind::Limit, found, "a table within the limit of entries"));
         }
         rows.push(columns.row(&record, bytes)?);
@@ -97,7 +98,8 @@ fn open(bytes: &[u8]) -> Result<(csv::Reader<&[u8]>, Columns)> {
             Ok(columns) => return Ok((reader, columns)),
             Err(found) => {
                 if best.as_ref().is_none_or(|(most, _)| split > *most) {
-                    let found = format!("a header line of {split} columns between {name}, {found}");
+                    let found =
+                        format!("a header line of {} between {name}, {found}", counted(split, "column"));
                     let expected = "columns file, theta_i, phi_i (or x_i, y_i, z_i), and theta_v, phi_v if views vary, \
                                     all angles in degrees; rename the columns, or take others out";
                     best = Some((split, Error::malformed(found, expected)));
@@ -208,8 +210,8 @@ fn translate(error: &csv::Error, bytes: &[u8]) -> Error {
     match error.kind() {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
             let (line, byte) = start(pos.as_ref(), bytes);
-            let expected = format!("{expected_len} columns as in the header");
-            Error::malformed(format!("line {line}: {len} columns"), expected).at(byte)
+            let expected = format!("{} as in the header", counted(*expected_len, "column"));
+            Error::malformed(format!("line {line}: {}", counted(*len, "column")), expected).at(byte)
         }
         _ => Error::malformed(error.to_string(), "a table of comma-separated values"),
     }

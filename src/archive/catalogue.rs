@@ -9,6 +9,7 @@ use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
 use super::{Options, list_of_bounded_size, read_beside};
 use crate::error::{Error, Kind, Result};
+use crate::words::counted;
 
 /// A complete set of images, how it was found, and what had to be assumed.
 pub(super) struct Found {
@@ -227,7 +228,8 @@ fn match_files(
         }
     }
     let remark = example.map(|example| {
-        format!("{different} names in {} are not quite those of the pictures: {example}", list.display())
+        let names = counted(different, "name");
+        format!("{names} in {} not quite as the pictures have it: {example}", list.display())
     });
     Ok((pairs, remark))
 }
@@ -239,9 +241,9 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
     pictures.sort_by(|&a, &b| natural_order(files.name(a), files.name(b)));
     if pictures.len() != lights.len() {
         return Err(Error::input(format!(
-            "{list}: got {} lights without names and {} pictures, expected as many",
-            lights.len(),
-            pictures.len()
+            "{list}: got {} without names and {}, expected as many",
+            counted(lights.len(), "light"),
+            counted(pictures.len(), "picture")
         )));
     }
     let neighbours = || pictures.iter().zip(pictures.iter().skip(1));

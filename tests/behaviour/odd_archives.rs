@@ -193,7 +193,7 @@ fn what_systems_leave_behind_is_not_looked_at() {
     files.push(("notes.txt", b"x".to_vec()));
     let (folder, root) = set(&files);
     assert_eq!(azimuths(&root).len(), 3);
-    assert!(told(&root).contains("6 other files are ignored"), "{}", told(&root));
+    assert!(told(&root).contains("6 other files ignored"), "{}", told(&root));
     // The same in a zip.
     let archive = folder.path().join("set.zip");
     let mut writer = zip::ZipWriter::new(fs::File::create(&archive).unwrap());

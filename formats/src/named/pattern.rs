@@ -7,6 +7,7 @@ use std::str::FromStr;
 use crate::behind::{Digits, Unit, names_another_unit, unit_behind};
 use crate::fields::{Field, Forms, NumberPrefix};
 use crate::file_name::picture_stem;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Pair, Result};
 
 /// Longest text of a pattern, bytes.
@@ -68,7 +69,7 @@ impl Pattern {
     pub fn parse(text: &str) -> Result<Pattern> {
         let wrong = |found: String, expected| Error::new(ErrorKind::Argument, found, expected);
         if text.len() > MAX_BYTES {
-            return Err(wrong(format!("a pattern of {} bytes", text.len()), "at most 1024 bytes"));
+            return Err(wrong(format!("a pattern of {}", counted(text.len(), "byte")), "at most 1024 bytes"));
         }
         let parts: Vec<Vec<Token>> = text.split('/').map(tokens).collect::<Result<_>>()?;
         let fields: Vec<Field> = parts

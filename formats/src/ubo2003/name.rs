@@ -4,6 +4,7 @@ use super::Angles;
 use crate::behind::{Digits, KNOWN_FORMS, Unit, unit_behind};
 use crate::fields::NumberPrefix;
 use crate::file_name::{base, picture_stem};
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// The labels of the four angles.
@@ -146,7 +147,7 @@ pub fn write_name(
     };
     for angle in [light.theta_deg(), light.phi_deg(), view.theta_deg(), view.phi_deg()] {
         if angle.fract() != 0.0 {
-            return Err(argument(format!("an angle of {angle} degrees"), "whole degrees"));
+            return Err(argument(format!("an angle of {}", counted(angle, "degree")), "whole degrees"));
         }
     }
     let (tl, pl) = (light.theta_deg(), light.phi_deg());

@@ -7,6 +7,7 @@ use crate::picture::aspect;
 use crate::picture::profile::{of_chromaticities, of_space_name};
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result};
 
 /// The first four bytes of every OpenEXR file.
@@ -67,9 +68,11 @@ impl<'a> Attributes<'a> {
             let kind = text(reader)?;
             let len = reader.i32_le()?;
             let Ok(len) = usize::try_from(len) else {
-                return Err(
-                    Error::malformed(format!("{len} bytes of the attribute {name:?}"), "at least 0").at(at)
-                );
+                return Err(Error::malformed(
+                    format!("{} of the attribute {name:?}", counted(len, "byte")),
+                    "at least 0",
+                )
+                .at(at));
             };
             let data = reader.take(len)?;
             let (slot, wanted) = match name.as_str() {
@@ -184,7 +187,7 @@ impl Header {
             let stated = Reader::new(stated).i32_le()?;
             if u64::try_from(stated).ok() != Some(header.chunk_count()) {
                 let expected = format!("{} for {width} x {height} pixels", header.chunk_count());
-                return Err(Error::malformed(format!("{stated} chunks"), expected).at(end));
+                return Err(Error::malformed(counted(stated, "chunk"), expected).at(end));
             }
         }
         Ok(header)

@@ -4,6 +4,7 @@ use crate::picture::profile::of_chromaticities;
 use crate::picture::size::{Size, unsupported};
 use crate::picture::{HdrOrientation, aspect};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result, SampleType};
 
 /// Longest line and longest header that are read; programs that process a picture add a line each.
@@ -181,7 +182,7 @@ fn line<'a>(reader: &mut Reader<'a>) -> Result<&'a str> {
     let rest = reader.rest();
     let within = rest.get(..rest.len().min(MAX_LINE)).unwrap_or_default();
     let Some(len) = within.iter().position(|&byte| byte == b'\n') else {
-        let found = format!("{} bytes without an end of line", within.len());
+        let found = format!("{} without an end of line", counted(within.len(), "byte"));
         return Err(Error::malformed(found, "a line of the header").at(at));
     };
     let text = reader.take(len)?;

@@ -9,6 +9,7 @@
 
 use crate::picture::size::unsupported;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Numbers of the tags that are looked at.
@@ -147,12 +148,15 @@ impl<'a> Directory<'a> {
         match (pictures.next(), pictures.len()) {
             (Some(only), 0) => only.unless_rivalled(&others),
             (Some(first), more) => Err(unsupported(
-                format!("{} pictures in {looked_at} directories ({})", more.saturating_add(1), told(&sizes)),
+                format!("{} in {} ({})",
+                    counted(more.saturating_add(1), "picture"),
+                    counted(looked_at, "directory"),
+                    told(&sizes)),
                 "one, beside smaller versions of it; save it alone in a file (tiffcp, or ImageMagick's FILE.tif[0])",
             )
             .at(first.at)),
             (None, _) => Err(unsupported(
-                format!("only smaller versions of a picture (NewSubfileType 1) in {looked_at} directories"),
+                format!("only smaller versions of a picture (NewSubfileType 1) in {}", counted(looked_at, "directory")),
                 "the full picture; a camera's raw file must be converted first, to a TIFF of 16 bits say",
             )
             .at(at)),
@@ -279,7 +283,8 @@ impl<'a> Directory<'a> {
         let left = fields.reader.rest().len();
         let needed = entry.count.saturating_mul(u64::from(len));
         if needed > u64::try_from(left).unwrap_or(u64::MAX) {
-            let found = format!("{left} bytes for the {} values of tag {tag}", entry.count);
+            let found =
+                format!("{} for the {} of tag {tag}", counted(left, "byte"), counted(entry.count, "value"));
             return Err(Error::malformed(found, format!("{needed}")).at(fields.reader.position()));
         }
         (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
@@ -330,7 +335,7 @@ impl<'a> Directory<'a> {
         match (self.list(tag)?.as_deref(), default) {
             (Some([value]), _) => Ok(*value),
             (Some(list), _) => {
-                let found = format!("{} values of tag {tag}", list.len());
+                let found = format!("{} of tag {tag}", counted(list.len(), "value"));
                 Err(Error::malformed(found, "one").at(self.at))
             }
             (None, Some(value)) => Ok(value),

@@ -8,7 +8,7 @@ use btfkit::store::model::appearance::AppearanceReport;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 
 /// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
 const FEW_CELLS: u64 = 4;
@@ -31,13 +31,13 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = appearance_plan(&self.model, &self.lattice)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_appearance(&plan.run(context)?, tell.found(found));
+        print_appearance(&plan.run(context)?, console.found(found));
         Ok(())
     }
 }
@@ -46,7 +46,7 @@ pub(super) fn appearance_plan(model: &Path, lattice: &LatticeChoice) -> Result<a
     appearance::plan(&appearance::Options { model: model.into(), lattice: *lattice })
 }
 
-pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
+pub(super) fn print_appearance(report: &AppearanceReport, console: Console) {
     let [_, _, height, width] = report.exemplar;
     let coarsest = report.levels.last().map_or(1, |level| level.spacing);
     let levels = counted(report.levels.len(), "level");
@@ -58,16 +58,16 @@ pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
         (found, 1) => format!("ribs, a period of {found} texels (rows, columns), {cells} of them"),
         (found, _) => format!("lattice of {found} texels (rows, columns), {cells} cells"),
     };
-    if tell.brief {
-        tell.stage("exemplar", &format!("{width}x{height}; {lattice}"));
+    if console.brief {
+        console.stage("exemplar", &format!("{width}x{height}; {lattice}"));
     } else {
         let text = format!("{width}x{height}, described at {levels}, 1 to {coarsest} texels apart");
-        tell.stage("exemplar", &text);
-        tell.line(format!("          {lattice}"));
+        console.stage("exemplar", &text);
+        console.line(format!("          {lattice}"));
     }
     let fewest = counts.fewest_in_a_direction();
     if !report.lattice.is_empty() && fewest < FEW_CELLS {
-        tell.line(format!(
+        console.line(format!(
             "          only {fewest} in a direction: large pieces of an enlargement will be copies; measure a larger part if you can, or let it bend by --lattice none"
         ));
     }

@@ -14,7 +14,7 @@ use serde_json::Value;
 use super::each::{Ended, Line, Outcome, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json};
+use super::{Console, as_json};
 
 /// Find faults in a measurement: swapped or mirrored directions, wrong curves, black, duplicate or misplaced images
 #[derive(Args)]
@@ -43,7 +43,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         if self.paths.len() > 1 && !self.pieces {
             if self.picture.is_some() {
@@ -51,14 +51,16 @@ impl Check {
                     .hint("check one at a time for a sheet, or say --pieces if they are one measurement"));
             }
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, self.json, context, tell, |path| self.one_of_many(path, context));
+            return each(&self.paths, name, self.json, context, console, |path| {
+                self.one_of_many(path, context)
+            });
         }
         let Examined { statistics, report, notes } = self.examine(&self.paths, context)?;
         if self.json {
-            tell.plan(&with_notes(&report, &notes)?)?;
+            console.plan(&with_notes(&report, &notes)?)?;
         } else {
-            tell_report(&report, tell);
-            tell.notes(&notes);
+            print_report(&report, console);
+            console.notes(&notes);
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
@@ -141,7 +143,7 @@ fn open(path: &Path) -> Result<Measurement> {
     Ok(measurement)
 }
 
-fn tell_report(report: &Report, tell: Tell) {
+fn print_report(report: &Report, console: Console) {
     let mut rows = vec![row!["check", "result", "of alarm", ""]];
     for check in &report.checks {
         let state = match check.state {
@@ -155,15 +157,15 @@ fn tell_report(report: &Report, tell: Tell) {
         });
         rows.push(row![check.name, state, alarm, check.detail]);
     }
-    tell.text(&table(&rows));
+    console.text(&table(&rows));
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
-        tell.line("");
-        tell.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
-        tell.line(format!("  {}", finding.message));
-        tell.line(format!("  evidence: {}", evidence(finding)));
+        console.line("");
+        console.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
+        console.line(format!("  {}", finding.message));
+        console.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
-            tell.line(format!("  repair:   btf import ... {repair}"));
+            console.line(format!("  repair:   btf import ... {repair}"));
         }
     }
 }

@@ -11,7 +11,7 @@ use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::tile::Seed;
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
 #[derive(Args)]
 pub(super) struct ClusterOptions {
@@ -118,25 +118,26 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let Self { measurement, model, options, seed, .. } = self;
         if self.dry_run {
             return match &options.clusters_of {
-                Some(from) => tell.plan(&taken_plan(model, from)?.summary()),
-                None => tell.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
+                Some(from) => console.plan(&taken_plan(model, from)?.summary()),
+                None => console.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
             };
         }
         let Some(step) = self.step() else {
             let (found, report) = run_clusters(measurement, model, options, seed.seed, context)?;
-            tell_clusters(&report, tell.found(found));
+            print_clusters(&report, console.found(found));
             return Ok(());
         };
         match cluster_plan(measurement, model, options, seed.seed)?.step(step, context)? {
-            Stepped::Done(report) => tell_clusters(&report, tell),
-            Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
-            Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
+            Stepped::Done(report) => print_clusters(&report, console),
+            Stepped::Next(pass) => console.line(format!("pass {pass} can begin")),
+            Stepped::Over(pass) => console.line(format!("pass {pass} is over")),
             Stepped::Assigned { pass, found, written } => {
-                tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
+                console
+                    .line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
         }
         Ok(())
@@ -208,7 +209,7 @@ fn cluster_plan(
     })
 }
 
-pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
+pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
     let passes = match (report.batches.len(), report.passes.len()) {
@@ -219,31 +220,31 @@ pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
     };
     let stored = report.representative_bytes + report.index_bytes;
     let ratio = |bytes: u64| bytes as f64 / stored as f64;
-    if tell.brief {
+    if console.brief {
         let error = report.representative_lightness_error;
         let ratio = ratio(report.measurement_bytes);
         let text = format!(
             "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
             report.clusters
         );
-        return tell.stage("clusters", &text);
+        return console.stage("clusters", &text);
     }
     let how = taken
         .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
-    tell.stage(
+    console.stage(
         "clusters",
         &format!(
             "{} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
             report.clusters, report.representative_lightness_error
         ),
     );
-    tell.line(format!(
+    console.line(format!(
         "          representatives {:.3} from their centres, at most {:.3}; {} of one texel",
         report.representative_from_centre,
         report.representative_from_centre_most,
         counted(report.single_texel_clusters, "cluster")
     ));
-    tell.line(format!(
+    console.line(format!(
         "size      representatives {} + index {}: 1:{:.1} of the raw tile, 1:{:.0} of the raw measurement",
         bytes_text(report.representative_bytes),
         bytes_text(report.index_bytes),

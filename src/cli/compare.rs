@@ -10,7 +10,7 @@ use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
 /// Compare a model with its measurement over the tile: errors in lightness and colour
@@ -39,13 +39,13 @@ pub(super) struct Compare {
 }
 
 impl Compare {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let report = compare::run(&options, context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
             for errors in report.elevations.iter().chain([&report.all]) {
@@ -58,13 +58,13 @@ impl Compare {
                     format!("{:.2}", errors.ciede2000_95)
                 ]);
             }
-            tell.text(&table(&rows));
-            tell.line(format!(
+            console.text(&table(&rows));
+            console.line(format!(
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
             if report.all.hues_are_lost() {
-                tell.line(format!(
+                console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
                     report.all.ciede2000, report.all.lightness
@@ -72,7 +72,7 @@ impl Compare {
             }
             if report.all.samples_left_out > 0 {
                 let count = counted(report.all.samples_left_out, "sample");
-                tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
+                console.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
         match &self.picture {

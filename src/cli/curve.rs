@@ -10,7 +10,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::table::{row, table};
-use super::{Tell, bytes_text};
+use super::{Console, bytes_text};
 
 /// Show the error and the compression for each number of clusters
 #[derive(Args)]
@@ -42,7 +42,7 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.out.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let plan = curve::plan(&curve::Options {
             measurement: self.measurement.clone(),
@@ -56,9 +56,9 @@ impl Curve {
         let curve = plan.run(context)?;
         if self.json {
             let value = serde_json::to_value(&curve).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            console.plan(&value)?;
         } else {
-            tell_curve(&curve, tell);
+            print_curve(&curve, console);
         }
         if let Some(path) = &self.out {
             curve.chart().draw().write(path, context.existing)?;
@@ -67,7 +67,7 @@ impl Curve {
     }
 }
 
-fn tell_curve(curve: &curve::Curve, tell: Tell) {
+fn print_curve(curve: &curve::Curve, console: Console) {
     let mut rows = vec![row!["clusters", "mean |dL*|", "size", "of raw measurement"]];
     for point in &curve.points {
         rows.push(row![
@@ -77,9 +77,9 @@ fn tell_curve(curve: &curve::Curve, tell: Tell) {
             curve::ratio_text(point.ratio)
         ]);
     }
-    tell.text(&table(&rows));
+    console.text(&table(&rows));
     if curve.sample_texels < curve.tile_texels {
-        tell.line(format!(
+        console.line(format!(
             "of a sample of {} of {}",
             curve.sample_texels,
             counted(curve.tile_texels, "texel")

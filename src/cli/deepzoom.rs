@@ -8,7 +8,7 @@ use btfkit::stage::image::Subject;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
+use super::Console;
 use super::scene::SceneArgs;
 
 /// JPEG quality of tiles, unless one is given.
@@ -63,7 +63,7 @@ impl Deepzoom {
         output: &Path,
         quality: Option<u8>,
         context: &Context<'_>,
-        tell: Tell,
+        console: Console,
     ) -> Result<()> {
         let plan = deepzoom::plan(
             &deepzoom::Options {
@@ -82,23 +82,23 @@ impl Deepzoom {
             context,
         )?;
         if self.dry_run {
-            return tell.plan(&plan.summary(context));
+            return console.plan(&plan.summary(context));
         }
         let report = plan.run(context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            return tell.plan(&value);
+            return console.plan(&value);
         }
         let [width, height] = report.size;
-        tell.line(format!(
+        console.line(format!(
             "{}: {width}x{height} in {}; {} written, {} found done",
             output.display(),
             counted(report.levels, "level"),
             counted(report.tiles_written, "tile"),
             report.tiles_found
         ));
-        tell.line(format!("{}: a viewer of it", output.with_extension("html").display()));
-        tell.notes(&report.notes);
+        console.line(format!("{}: a viewer of it", output.with_extension("html").display()));
+        console.notes(&report.notes);
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use btfkit::error::Result;
 use btfkit::run::Context;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::sample::Material;
 use super::table::{row, table};
 
@@ -26,13 +26,13 @@ pub(super) struct Demo {
 }
 
 impl Demo {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let options = demo::Options { folder: self.folder.clone(), kind: self.material.into() };
         let report = demo::run(&options, context)?;
         let rows: Vec<_> =
             report.steps.iter().map(|step| row![step.name, format!("{:.2} s", step.seconds)]).collect();
-        tell.text(&table(&rows));
-        tell.line(format!("open {} in a browser", report.page.display()));
+        console.text(&table(&rows));
+        console.line(format!("open {} in a browser", report.page.display()));
         Ok(())
     }
 }

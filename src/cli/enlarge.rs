@@ -13,7 +13,7 @@ use clap::{Args, ValueEnum};
 
 use super::each::{Ended, Line, each};
 use super::outputs::{Naming, Pair};
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
 /// Tiles of a set, unless their number is given.
 const TILES: usize = 4;
@@ -103,17 +103,17 @@ enum Method {
 }
 
 impl Enlarge {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         self.refuse_options_of_others()?;
         let naming = Naming { reads: model::KIND, ending: Some(".model.zarr"), becomes: ".enlarged.zarr" };
         let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
         if let [pair] = pairs.as_slice() {
-            tell_reports(&self.one(pair, context, tell)?, self.size, tell);
+            print_reports(&self.one(pair, context, console)?, self.size, console);
             return Ok(Ended::Done);
         }
         let name = |pair: &Pair| pair.input.display().to_string();
-        each(&pairs, name, false, context, tell, |pair| {
-            let reports = self.one(pair, context, tell)?;
+        each(&pairs, name, false, context, console, |pair| {
+            let reports = self.one(pair, context, console)?;
             let mut told = Vec::new();
             for report in &reports {
                 told.push(in_short(report, self.size));
@@ -125,7 +125,7 @@ impl Enlarge {
     }
 
     /// Makes the outputs of one model; none where only the plan was asked for.
-    fn one(&self, pair: &Pair, context: &Context<'_>, tell: Tell) -> Result<Vec<Report>> {
+    fn one(&self, pair: &Pair, context: &Context<'_>, console: Console) -> Result<Vec<Report>> {
         let plan = enlarge::plan(&enlarge::Options {
             model: pair.input.clone(),
             output: pair.output.clone(),
@@ -136,7 +136,7 @@ impl Enlarge {
             shard: self.shard,
         })?;
         if self.dry_run {
-            tell.plan(&plan.summary(context))?;
+            console.plan(&plan.summary(context))?;
             return Ok(Vec::new());
         }
         plan.run(context)
@@ -186,17 +186,17 @@ impl Enlarge {
     }
 }
 
-fn tell_reports(reports: &[Report], size: Size, tell: Tell) {
+fn print_reports(reports: &[Report], size: Size, console: Console) {
     for report in reports {
-        tell.line(in_short(report, size));
-        tell.line(format!(
+        console.line(in_short(report, size));
+        console.line(format!(
             "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
             bytes_text(report.stored_bytes),
             report.raw_bytes as f64 / report.stored_bytes as f64,
             bytes_text(report.raw_bytes)
         ));
         if let Some(verdict) = &report.verdict {
-            tell_verdict(verdict, tell);
+            print_verdict(verdict, console);
         }
     }
 }
@@ -214,18 +214,18 @@ fn in_short(report: &Report, size: Size) -> String {
 }
 
 /// One line on whether an enlargement looks like its tile, and one for each warning.
-fn tell_verdict(verdict: &Verdict, tell: Tell) {
+fn print_verdict(verdict: &Verdict, console: Console) {
     let copy = match verdict.counted.largest_copy {
         Some(copy) => format!(", largest unbroken copy {:.1} % of the middle", 100.0 * copy),
         None => String::new(),
     };
-    tell.line(format!(
+    console.line(format!(
         "likeness  {:.0} % of the clusters' shares as in the tile, repetition {:+.2}{copy}",
         100.0 * verdict.counted.shares,
         verdict.excess_peak
     ));
     for warning in &verdict.warnings {
-        tell.line(format!("warning   {warning}"));
+        console.line(format!("warning   {warning}"));
     }
 }
 

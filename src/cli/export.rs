@@ -1,13 +1,13 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use btfkit::stage::export::{self, Format};
 use btfkit::store::measurement::Measurement;
 use clap::{Args, ValueEnum};
 
 use super::deepzoom::Deepzoom;
-use super::{Tell, bytes_text, found};
+use super::{Console, bytes_text, found};
 
 /// Write a measurement as an archive (zip, EXR, PNG, HDF5, npy, Bonn), or a picture as Deep Zoom tiles
 #[derive(Args)]
@@ -71,11 +71,11 @@ impl Export {
         }
     }
 
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
             let is_idle = |name: &str| name == "rank" || name == "quality" && !self.deepzoom.is_jpeg();
             self.refuse_idle("a Deep Zoom pyramid like this one", is_idle)?;
-            return self.deepzoom.run(&self.store, &self.output, self.quality, context, tell);
+            return self.deepzoom.run(&self.store, &self.output, self.quality, context, console);
         }
         let format = match self.to {
             Some(FormatName::Ubo2003) => Format::Ubo2003,
@@ -86,8 +86,11 @@ impl Export {
             Some(FormatName::Dfmf) => Format::Dfmf,
             Some(FormatName::Fmf) => Format::Fmf,
             None => of_name(&self.output).ok_or_else(|| {
-                Error::new(Kind::Usage, format!("{}: no format goes by this name", self.output.display()))
-                    .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
+                Error::new(
+                    ErrorKind::Usage,
+                    format!("{}: no format goes by this name", self.output.display()),
+                )
+                .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
             })?,
         };
         if self.output.extension().is_some_and(|ending| ending == "dzi") {
@@ -116,8 +119,13 @@ impl Export {
             quality: self.quality.unwrap_or(100),
         };
         let report = export::run(&measurement, &options, context)?;
-        tell.line(format!("{}: {}{}", self.output.display(), bytes_text(report.bytes), found(report.made)));
-        tell.notes(&report.warnings);
+        console.line(format!(
+            "{}: {}{}",
+            self.output.display(),
+            bytes_text(report.bytes),
+            found(report.made)
+        ));
+        console.notes(&report.warnings);
         Ok(())
     }
 }

@@ -12,7 +12,7 @@ use btfkit::store::model::field::FieldReport;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
 /// Fit a random field to a model's normal map, for `btf enlarge --method paper`
@@ -41,7 +41,7 @@ pub(super) struct Fit {
 pub(super) struct FitOptions {
     /// Random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
     #[arg(long, value_enum, default_value = "3d")]
-    mrf: Kind,
+    mrf: CarKind,
     /// Levels of the pyramid [default: 1 to 5, whichever keeps the autocovariance best]
     #[arg(long)]
     levels: Option<usize>,
@@ -58,7 +58,7 @@ pub(super) struct FitOptions {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Kind {
+enum CarKind {
     #[value(name = "3d")]
     Car3d,
     #[value(name = "2d")]
@@ -85,19 +85,19 @@ enum Marginals {
 }
 
 impl Fit {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = fit_plan(&self.model, &self.options)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_field(&plan.run(context)?, tell.found(found));
+        print_field(&plan.run(context)?, console.found(found));
         let Some(name) = &self.report else { return Ok(()) };
         let comparison = fit::compare(&self.model, context)?;
         let text = figures_text(&comparison.figures());
         let file = |ending: &str| name.with_file_name(with_ending(name, &[], ending));
         let title = self.model.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        tell.text(&text);
+        console.text(&text);
         let text = prepare_bytes(&file(".txt"), context.existing, format!("{text}\n").as_bytes())?;
         let sheet = sheet::draw(&comparison, &title).prepare(&file(".png"), context.existing)?;
         publish_all([text, sheet])?;
@@ -109,8 +109,8 @@ pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> 
     fit::plan(&fit::Options {
         model: model.into(),
         kind: match options.mrf {
-            Kind::Car3d => field::Kind::Car3d,
-            Kind::Car2d => field::Kind::Car2d,
+            CarKind::Car3d => field::CarKind::Car3d,
+            CarKind::Car2d => field::CarKind::Car2d,
         },
         levels: options.levels,
         coordinates: match options.field {
@@ -129,7 +129,7 @@ pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> 
     })
 }
 
-pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
+pub(super) fn print_field(report: &FieldReport, console: Console) {
     let levels: Vec<String> = report
         .levels
         .iter()
@@ -139,16 +139,16 @@ pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
         })
         .collect();
     let error = format!("error of its autocovariance {:.3}", report.autocovariance_error);
-    if tell.brief {
+    if console.brief {
         let levels = counted(report.levels.len(), "level");
-        tell.stage("field", &format!("{}, {levels}; {error}", report.mrf));
+        console.stage("field", &format!("{}, {levels}; {error}", report.mrf));
     } else {
-        tell.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
-        tell.line(format!("          {error}"));
+        console.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
+        console.line(format!("          {error}"));
     }
     for (number, level) in report.levels.iter().enumerate() {
         if let Some(note) = &level.note {
-            tell.line(format!("          level {number}: {note}"));
+            console.line(format!("          level {number}: {note}"));
         }
     }
 }

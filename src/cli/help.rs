@@ -14,7 +14,7 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, roman};
 
 use super::terminal::{of_output, pieces};
-use super::{Cli, Tell};
+use super::{Cli, Console};
 
 /// Commands by what they are for, in the order of the work.
 const GROUPS: [(&str, &[&str]); 6] = [
@@ -118,10 +118,10 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, console: Console) -> Result<()> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "btf", &mut text);
-        tell.as_it_is(String::from_utf8_lossy(&text).trim_end());
+        console.as_it_is(String::from_utf8_lossy(&text).trim_end());
         Ok(())
     }
 }
@@ -143,11 +143,11 @@ pub(super) struct Manual {
 }
 
 impl Manual {
-    pub(super) fn run(&self, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, console: Console) -> Result<()> {
         let mut whole = command();
         whole.build();
         if let Some(folder) = &self.out {
-            return write_pages(&whole, folder, tell);
+            return write_pages(&whole, folder, console);
         }
         let page = match &self.page {
             None => &whole,
@@ -155,12 +155,12 @@ impl Manual {
                 Error::usage(format!("no command is called {name:?}")).hint("btf --help lists them")
             })?,
         };
-        tell.as_it_is(String::from_utf8_lossy(&rendered(page)?).trim_end());
+        console.as_it_is(String::from_utf8_lossy(&rendered(page)?).trim_end());
         Ok(())
     }
 }
 
-fn write_pages(whole: &Command, folder: &Path, tell: Tell) -> Result<()> {
+fn write_pages(whole: &Command, folder: &Path, console: Console) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io("make", folder, error))?;
     let commands: Vec<&Command> = std::iter::once(whole)
         .chain(whole.get_subcommands().filter(|command| command.get_name() != "help"))
@@ -168,7 +168,7 @@ fn write_pages(whole: &Command, folder: &Path, tell: Tell) -> Result<()> {
     for command in &commands {
         write_file(&folder.join(format!("{}.1", page_name(command))), &rendered(command)?)?;
     }
-    tell.line(format!("{}: {}", folder.display(), counted(commands.len(), "page")));
+    console.line(format!("{}: {}", folder.display(), counted(commands.len(), "page")));
     Ok(())
 }
 

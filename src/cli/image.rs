@@ -7,7 +7,7 @@ use btfkit::stage::image;
 use clap::{Args, ValueEnum};
 
 use super::scene::SceneArgs;
-use super::{Tell, found};
+use super::{Console, found};
 
 /// Write a picture of a measurement, a model's tile or an enlargement
 #[derive(Args)]
@@ -61,7 +61,7 @@ enum What {
 }
 
 impl Image {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let subject = match self.what {
             What::Appearance => image::Subject::Appearance { view: self.scene.view, light: self.scene.light },
             What::Index => image::Subject::Index,
@@ -74,8 +74,8 @@ impl Image {
         };
         let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(Some(bits), self.quality)?;
         let report = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
-        tell.line(format!("{}: {}{}", self.out.display(), report.size, found(report.made)));
-        tell.notes(&report.notes);
+        console.line(format!("{}: {}{}", self.out.display(), report.size, found(report.made)));
+        console.notes(&report.notes);
         Ok(())
     }
 }

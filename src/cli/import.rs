@@ -13,7 +13,7 @@ use clap::Args;
 use super::each::{Ended, Line, each};
 use super::outputs::wanted_twice;
 use super::source::SourceArgs;
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
 /// Convert archives into measurements, from any format that `btf info` lists; one archive or hundreds
 #[derive(Args)]
@@ -56,12 +56,12 @@ struct Job {
 }
 
 impl Import {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         let jobs = self.jobs()?;
-        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, tell) };
-        if let Some((description, report, remarks)) = self.import(job, context, tell)? {
-            tell.line(format!("{}: {}", job.store.display(), told(&description, &report)));
-            remarks.iter().for_each(|remark| tell.line(format!("  {remark}")));
+        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, console) };
+        if let Some((description, report, remarks)) = self.import(job, context, console)? {
+            console.line(format!("{}: {}", job.store.display(), summary(&description, &report)));
+            remarks.iter().for_each(|remark| console.line(format!("  {remark}")));
         }
         Ok(Ended::Done)
     }
@@ -122,7 +122,7 @@ impl Import {
         &self,
         job: &Job,
         context: &Context<'_>,
-        tell: Tell,
+        console: Console,
     ) -> Result<Option<(Description, Report, Vec<String>)>> {
         let source = self.source.open(&job.pieces)?;
         let options = import::Options {
@@ -133,7 +133,7 @@ impl Import {
         };
         let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
-            tell.plan(&plan.summary())?;
+            console.plan(&plan.summary())?;
             return Ok(None);
         }
         let report = plan.run(context)?;
@@ -143,7 +143,7 @@ impl Import {
     }
 
     /// Imports many archives under one bar; those that fail do not stop the others.
-    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    fn import_all(&self, jobs: &[Job], context: &Context<'_>, console: Console) -> Result<Ended> {
         // Counted before anything is imported: opening an archive is cheap.
         let images = |job: &Job| {
             let contents = self.source.open(&job.pieces).map(|source| {
@@ -159,11 +159,11 @@ impl Import {
             .with_memory(context.memory())
             .with_existing(context.existing);
         let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
-        each(jobs, name, false, context, tell, |job| {
+        each(jobs, name, false, context, console, |job| {
             context.progress.remark(&name(job));
-            let report = self.import(job, &inner, tell)?;
+            let report = self.import(job, &inner, console)?;
             let told = report.map(|(description, report, remarks)| {
-                std::iter::once(told(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
+                std::iter::once(summary(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
             });
             let store = job.store.display();
             Ok((Line::Text(told.map_or(format!("{store}"), |told| format!("{store}: {told}"))), None))
@@ -171,7 +171,7 @@ impl Import {
     }
 }
 
-fn told(description: &Description, report: &Report) -> String {
+fn summary(description: &Description, report: &Report) -> String {
     let mut text = format!(
         "{} x {} of {}, {} raw; {} written, {} found done, {} clipped at white",
         counted(description.views.len(), "view"),

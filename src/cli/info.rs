@@ -17,7 +17,7 @@ use serde_json::Value;
 use super::each::{Ended, Line, each};
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json, bytes_text};
+use super::{Console, as_json, bytes_text};
 
 /// Show what an archive or a store holds, and how large the store of an archive will be
 #[derive(Args)]
@@ -71,10 +71,10 @@ enum Told {
 type Rows = Vec<Vec<String>>;
 
 impl Info {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         if self.paths.len() > 1 && !self.pieces {
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, self.json, context, tell, |path| {
+            return each(&self.paths, name, self.json, context, console, |path| {
                 let told = self.look(std::slice::from_ref(path), context)?;
                 let line =
                     if self.json { Line::Json(as_json(&told)?) } else { Line::Text(in_short(&rows(&told))) };
@@ -83,9 +83,9 @@ impl Info {
         }
         let told = self.look(&self.paths, context)?;
         if self.json {
-            tell.plan(&as_json(&told)?)?;
+            console.plan(&as_json(&told)?)?;
         } else {
-            tell.text(&table(&rows(&told)));
+            console.text(&table(&rows(&told)));
         }
         Ok(Ended::Done)
     }

@@ -11,7 +11,7 @@ use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
 /// Rate an enlargement beside real crops of the material: 1 is as near as another real crop
@@ -52,7 +52,7 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         if let Some(path) = &self.sheet {
             Ending::of(path, &Ending::DISPLAY)?;
         }
@@ -67,7 +67,7 @@ impl Judge {
             },
             context,
         )?;
-        tell.text(&told(&report));
+        console.text(&text_of(&report));
         let mut files = Vec::new();
         if let Some(path) = &self.json {
             let text =
@@ -82,7 +82,7 @@ impl Judge {
     }
 }
 
-fn told(report: &Report) -> String {
+fn text_of(report: &Report) -> String {
     let [height, width] = report.size;
     let origin = match report.origin {
         Origin::HeldOut => "parts of the measurement that the tile did not use",

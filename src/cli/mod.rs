@@ -38,7 +38,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use btfkit::disk::output::Made;
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::budget::{Allowance, cannot_start, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::run::{Context, Existing};
@@ -178,7 +178,7 @@ pub(crate) fn run() -> ExitCode {
         ProgressStyle::Json => Box::new(progress::Lines::default()),
         ProgressStyle::Auto => Box::new(progress::Bars::default()),
     };
-    let tell = Tell {
+    let console = Console {
         quiet: cli.common.quiet,
         found: false,
         brief: false,
@@ -197,10 +197,10 @@ pub(crate) fn run() -> ExitCode {
             let context = context.with_memory(memory);
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
-        .inspect(|context| obey_while_computing(&stop, context.computing(), tell))
+        .inspect(|context| obey_while_computing(&stop, context.computing(), console))
         .and_then(|context| {
             context.require("the program itself", 0)?;
-            cli.command.run(&context, tell)
+            cli.command.run(&context, console)
         });
     progress.end();
     let result = result.and_then(|ended| match UNTOLD.get() {
@@ -213,7 +213,7 @@ pub(crate) fn run() -> ExitCode {
         Ok(Ended::Done) => ExitCode::SUCCESS,
         Ok(Ended::Failed(kind)) => ExitCode::from(exit_code(kind)),
         Err(error) => {
-            tell.failure(None, &error);
+            console.failure(None, &error);
             ExitCode::from(exit_code(error.kind()))
         }
     }
@@ -242,7 +242,7 @@ fn explain_aborts(json: bool) {
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Ends the program at the first signal while it computes what cannot look for one: there is nothing to lose but time.
-fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell: Tell) {
+fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, console: Console) {
     let stop = Arc::clone(stop);
     // Without a thread for it the second signal ends the program.
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
@@ -250,7 +250,7 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell
             std::thread::sleep(LOOK);
             if stop.load(Ordering::SeqCst) && computing.load(Ordering::SeqCst) {
                 let error = Error::stopped();
-                tell.failure(None, &error);
+                console.failure(None, &error);
                 std::process::exit(i32::from(exit_code(error.kind())));
             }
         }
@@ -258,47 +258,47 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell
 }
 
 impl Command {
-    fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         let single = match self {
-            Self::Info(command) => return command.run(context, tell),
-            Self::Check(command) => return command.run(context, tell),
-            Self::Import(command) => return command.run(context, tell),
-            Self::Verify(command) => return command.run(context, tell),
-            Self::Model(command) => return command.run(context, tell),
-            Self::Enlarge(command) => return command.run(context, tell),
-            Self::Demo(command) => command.run(context, tell),
-            Self::Sample(command) => command.run(context, tell),
-            Self::Export(command) => command.run(context, tell),
-            Self::Tile(command) => command.run(context, tell),
-            Self::Cluster(command) => command.run(context, tell),
-            Self::Curve(command) => command.run(context, tell),
-            Self::Normals(command) => command.run(context, tell),
-            Self::Fit(command) => command.run(context, tell),
-            Self::Appearance(command) => command.run(context, tell),
-            Self::Compare(command) => command.run(context, tell),
-            Self::Image(command) => command.run(context, tell),
-            Self::Judge(command) => command.run(context, tell),
-            Self::Completions(command) => command.run(tell),
-            Self::Man(command) => command.run(tell),
+            Self::Info(command) => return command.run(context, console),
+            Self::Check(command) => return command.run(context, console),
+            Self::Import(command) => return command.run(context, console),
+            Self::Verify(command) => return command.run(context, console),
+            Self::Model(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(context, console),
+            Self::Demo(command) => command.run(context, console),
+            Self::Sample(command) => command.run(context, console),
+            Self::Export(command) => command.run(context, console),
+            Self::Tile(command) => command.run(context, console),
+            Self::Cluster(command) => command.run(context, console),
+            Self::Curve(command) => command.run(context, console),
+            Self::Normals(command) => command.run(context, console),
+            Self::Fit(command) => command.run(context, console),
+            Self::Appearance(command) => command.run(context, console),
+            Self::Compare(command) => command.run(context, console),
+            Self::Image(command) => command.run(context, console),
+            Self::Judge(command) => command.run(context, console),
+            Self::Completions(command) => command.run(console),
+            Self::Man(command) => command.run(console),
         };
         single.map(|()| Ended::Done)
     }
 }
 
-fn exit_code(kind: Kind) -> u8 {
+fn exit_code(kind: ErrorKind) -> u8 {
     match kind {
-        Kind::Internal => 1,
-        Kind::Usage => 2,
-        Kind::Input | Kind::Recipe => 65,
-        Kind::Missing => 66,
-        Kind::Io => 74,
-        Kind::Stopped => 75,
+        ErrorKind::Internal => 1,
+        ErrorKind::Usage => 2,
+        ErrorKind::Input | ErrorKind::Recipe => 65,
+        ErrorKind::Missing => 66,
+        ErrorKind::Io => 74,
+        ErrorKind::Stopped => 75,
     }
 }
 
 /// Where results are told.
 #[derive(Clone, Copy)]
-struct Tell {
+struct Console {
     quiet: bool,
     /// What is told was found done.
     found: bool,
@@ -308,7 +308,7 @@ struct Tell {
     json: bool,
 }
 
-impl Tell {
+impl Console {
     /// Tells nothing but failures.
     fn silent(self) -> Self {
         Self { quiet: true, ..self }

@@ -2,13 +2,13 @@ use std::path::PathBuf;
 
 use btfkit::error::Result;
 use btfkit::run::Context;
-use btfkit::sample::{Kind, MOST_SIDE};
+use btfkit::sample::{MOST_SIDE, MaterialKind};
 use btfkit::shape::Size;
 use btfkit::stage::sample;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::{Tell, bytes_text, found, number};
+use super::{Console, bytes_text, found, number};
 
 /// Make a synthetic measurement: a zip of pictures named like those of UBO2003
 #[derive(Args)]
@@ -51,7 +51,7 @@ pub(super) enum Material {
     Leather,
 }
 
-impl From<Material> for Kind {
+impl From<Material> for MaterialKind {
     fn from(material: Material) -> Self {
         match material {
             Material::Wood => Self::Wood,
@@ -61,7 +61,7 @@ impl From<Material> for Kind {
 }
 
 impl Sample {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),
@@ -74,7 +74,7 @@ impl Sample {
             },
             context,
         )?;
-        tell.line(format!(
+        console.line(format!(
             "{}: {}, {}{}",
             self.archive.display(),
             counted(report.images, "image"),

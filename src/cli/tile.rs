@@ -6,7 +6,7 @@ use btfkit::run::Context;
 use btfkit::stage::tile;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 
 /// Of a plane of which the tile is less than this, more is worth having.
 const LITTLE: f64 = 0.5;
@@ -52,13 +52,13 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = tile_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_tile(&plan.run(context)?, tell.found(found));
+        print_tile(&plan.run(context)?, console.found(found));
         Ok(())
     }
 }
@@ -78,7 +78,7 @@ pub(super) fn tile_plan(
     })
 }
 
-pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
+pub(super) fn print_tile(report: &tile::Report, console: Console) {
     let [height, width] = report.size;
     let seams = match &report.patch {
         Some(patch) => format!(
@@ -91,23 +91,23 @@ pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
         ),
         None => "the whole measurement, its borders do not join".to_owned(),
     };
-    tell.stage("tile", &format!("{width}x{height} {seams}"));
+    console.stage("tile", &format!("{width}x{height} {seams}"));
     let lattice = &report.lattice;
     let cells = WaveCounts(report.cells.clone()).cells();
     match lattice.vectors().len() {
         0 => {}
         _ if cells == 0 => {
-            tell.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
+            console.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
         }
-        1 => tell
+        1 => console
             .line(format!("          holds {cells} ribs, a period of {lattice:.1} texels (rows, columns)")),
-        _ => tell.line(format!(
+        _ => console.line(format!(
             "          holds {cells} cells of the lattice {lattice:.1} texels (rows, columns)"
         )),
     }
     let [texels, all] = [report.size, report.measurement_size].map(|[height, width]| (height * width) as f64);
     if texels < LITTLE * all {
-        tell.line(format!(
+        console.line(format!(
             "          {:.0} % of what was measured: --tile none gives enlargements all of it to draw on, and the clustering {:.1} times the texels",
             100.0 * texels / all,
             all / texels

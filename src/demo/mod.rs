@@ -28,7 +28,7 @@ use crate::method::cluster::centre::CentreRule;
 use crate::method::cluster::lloyd::Limits;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
-use crate::sample::Kind;
+use crate::sample::MaterialKind;
 use crate::shape::Size;
 use crate::stage::cluster::Amount;
 use crate::stage::import::Shard;
@@ -45,7 +45,7 @@ pub struct Options {
     /// Folder for everything that is made.
     pub folder: PathBuf,
     /// Which material.
-    pub kind: Kind,
+    pub kind: MaterialKind,
 }
 
 /// What was made.
@@ -59,7 +59,7 @@ pub struct Report {
 
 /// Settings of the run; where the program has a default for one, that default.
 struct Settings {
-    kind: Kind,
+    kind: MaterialKind,
     sample: Size,
     directions: usize,
     clusters: usize,
@@ -71,7 +71,7 @@ struct Settings {
 }
 
 impl Settings {
-    fn new(kind: Kind) -> Self {
+    fn new(kind: MaterialKind) -> Self {
         Self {
             kind,
             sample: Size { height: 176, width: 176 },
@@ -88,8 +88,8 @@ impl Settings {
     /// Name of the material, as the program takes it.
     fn material(&self) -> &'static str {
         match self.kind {
-            Kind::Wood => "wood",
-            Kind::Leather => "leather",
+            MaterialKind::Wood => "wood",
+            MaterialKind::Leather => "leather",
         }
     }
 }
@@ -113,7 +113,7 @@ const PICTURE_BYTES: u64 = 40 << 20;
 /// Runs the demo, or goes on with it.
 ///
 /// # Errors
-/// [`crate::Kind::Recipe`] where the folder holds the demo of another material, and whatever the stages
+/// [`crate::ErrorKind::Recipe`] where the folder holds the demo of another material, and whatever the stages
 /// report.
 pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     run_with(&Settings::new(options.kind), &options.folder, context)
@@ -292,7 +292,7 @@ mod tests {
             directions: 13,
             clusters: 16,
             enlarged: Size::new(96, 80),
-            ..Settings::new(Kind::Wood)
+            ..Settings::new(MaterialKind::Wood)
         };
         let folder = tempfile::tempdir().unwrap();
         let stop = AtomicBool::new(false);

@@ -33,7 +33,7 @@ impl Times {
     /// Reads the record at `path`, or begins one.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where the folder holds another demo.
+    /// [`crate::ErrorKind::Recipe`] where the folder holds another demo.
     pub(super) fn open(path: PathBuf, recipe: Value) -> Result<Self> {
         let steps = match MappedFile::open(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
@@ -81,7 +81,7 @@ impl Times {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
 
     fn wait(milliseconds: u64) {
         std::thread::sleep(std::time::Duration::from_millis(milliseconds));
@@ -120,7 +120,7 @@ mod tests {
             Times::open(folder.path().join("demo.json"), json!({"material": material})).map(|_| ())
         };
         open("wood").unwrap();
-        assert_eq!(open("leather").unwrap_err().kind(), Kind::Recipe);
+        assert_eq!(open("leather").unwrap_err().kind(), ErrorKind::Recipe);
         open("wood").unwrap();
     }
 }

@@ -1,6 +1,7 @@
 //! Files that are written: to a temporary name, synced, and given their own name when they are whole.
 //!
-//! A kill leaves a temporary file, which the next run sweeps, and never a torn one that a later run would take for done.
+//! A kill leaves a temporary file, which the next run sweeps, and never a torn one that a later run would take for
+//! done.
 #![allow(clippy::disallowed_methods)] // they are wrapped here
 
 use std::collections::hash_map::RandomState;
@@ -186,7 +187,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 /// away first: at no time does a part of it look like something unfinished.
 ///
 /// # Errors
-/// [`crate::Kind::Recipe`] where it holds a file of another's.
+/// [`crate::ErrorKind::Recipe`] where it holds a file of another's.
 pub(crate) fn remove_folder(path: &Path, is_own: impl Fn(&Path) -> bool) -> Result<()> {
     let mut folders = vec![path.to_owned()];
     while let Some(folder) = folders.pop() {

@@ -1,6 +1,6 @@
 //! What `--memory` allows: the program's own share, what a stage needs at least, and what the system leaves.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::words::counted;
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
@@ -27,7 +27,8 @@ impl Allowance {
     /// Checks what cannot be done without against what is allowed. `otherwise` is what else helps, if anything does.
     ///
     /// # Errors
-    /// With what it needs and what to do: [`Kind::Usage`], or [`Kind::Internal`] where the system leaves no more.
+    /// With what it needs and what to do: [`ErrorKind::Usage`], or [`ErrorKind::Internal`] where the system leaves no
+    /// more.
     pub fn require(self, what: &str, needed: u64, otherwise: &str) -> Result<()> {
         if needed <= self.bytes {
             return Ok(());
@@ -36,7 +37,7 @@ impl Allowance {
         let found = format!("{what} takes {mib} MiB of memory, {} allowed", amount(self.bytes));
         let or = if otherwise.is_empty() { String::new() } else { format!("; or {otherwise}") };
         Err(if self.by_system {
-            Error::new(Kind::Internal, format!("{found} by the limit of the address space"))
+            Error::new(ErrorKind::Internal, format!("{found} by the limit of the address space"))
                 .hint(format!("raise that limit (ulimit -v){or}"))
         } else {
             Error::usage(found).hint(format!("--memory {mib}MiB, or more, allows it{or}"))
@@ -56,7 +57,7 @@ fn amount(bytes: u64) -> String {
 
 /// The error of threads that the system does not start.
 pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
-    Error::new(Kind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
+    Error::new(ErrorKind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
         .hint("choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)")
 }
 
@@ -119,7 +120,7 @@ mod tests {
         let hint = by(1, false).unwrap_err().guidance().unwrap().to_owned();
         assert_eq!(hint, "--memory 70MiB, or more, allows it; or make it smaller");
         let error = by(64 << 20, true).unwrap_err();
-        assert_eq!(error.kind(), Kind::Internal);
+        assert_eq!(error.kind(), ErrorKind::Internal);
         let hint = error.guidance().unwrap();
         assert!(hint.contains("ulimit -v") && !hint.contains("--memory"), "{hint}");
         assert!(by(70 << 20, false).is_ok());

@@ -1,4 +1,4 @@
-//! Model against measurement: how well the tile is re-made from its index and representatives.
+//! Model against measurement: how well the tile is reconstructed from its index and representatives.
 
 use std::path::PathBuf;
 
@@ -30,7 +30,7 @@ pub struct Options {
     pub measurement: PathBuf,
 }
 
-/// Errors of the re-made tile.
+/// Errors of the reconstructed tile.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// One entry an elevation of the view, frontal first.
@@ -58,13 +58,14 @@ pub struct Errors {
     pub samples_left_out: u64,
     /// Mean CIEDE2000.
     pub ciede2000: f64,
-    /// The CIEDE2000 that 95 % of the texels' samples stay below or at, to 0.05; the last step stands for all above 100.
+    /// The CIEDE2000 that 95 % of the texels' samples stay below or at, to 0.05; the last step stands for all above
+    /// 100.
     pub ciede2000_95: f64,
 }
 
 impl Errors {
-    /// Whether colours differ by much more than their lightness: texels of one lightness and several hues share clusters,
-    /// which are formed by lightness alone.
+    /// Whether colours differ by much more than their lightness: texels of one lightness and several hues share
+    /// clusters, which are formed by lightness alone.
     pub fn hues_are_lost(&self) -> bool {
         /// A colour difference that is seen beside each other by everybody.
         const SEEN: f64 = 3.0;

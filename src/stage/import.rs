@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::archive::Source;
 use crate::color::{Remarkable, Transfer};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::units::each_at_once;
@@ -198,7 +198,7 @@ impl Plan<'_> {
         // One view is written while the next is decoded; the threads share the work of each.
         let read = |&view: &usize| match read_view(self.source, view, self.options.white, context) {
             // A broken image does not keep the others from being looked at: all are named at the end.
-            Err(error) if error.kind() == Kind::Input => Ok((view, Err(error.to_string()))),
+            Err(error) if error.kind() == ErrorKind::Input => Ok((view, Err(error.to_string()))),
             images => Ok((view, Ok(images?))),
         };
         read_ahead::for_each(context, in_flight, &missing, read, |(view, images)| {
@@ -216,7 +216,7 @@ impl Plan<'_> {
         })?;
         context.progress.end();
         if !problems.is_empty() {
-            return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
+            return Err(Error::list(ErrorKind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));
         }
         measurement.finish(context)?;
@@ -259,14 +259,14 @@ pub(crate) fn read_view(
                     *before.get_or_insert_default() += found;
                 }
             }
-            Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
+            Err(error) if error.kind() == ErrorKind::Input => problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
     }
     if problems.is_empty() {
         Ok((images, before))
     } else {
-        Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
+        Err(Error::list(ErrorKind::Input, problems.iter().flat_map(|problem| problem.lines())))
     }
 }
 

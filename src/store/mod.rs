@@ -75,7 +75,7 @@ impl Store {
     /// Returns a lock that keeps others from removing this one; it is to be held while the store is written.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's store lies there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's store lies there.
     pub fn begin_by_recipe(
         &mut self,
         kind: &str,
@@ -150,8 +150,8 @@ impl Store {
     /// The attributes of a store that must exist and be of this kind.
     ///
     /// # Errors
-    /// [`crate::Kind::Missing`] where there is nothing; [`crate::Kind::Input`] where there is something else, or a store
-    /// whose attributes were changed: says what it is, and what to do.
+    /// [`crate::ErrorKind::Missing`] where there is nothing; [`crate::ErrorKind::Input`] where there is something else,
+    /// or a store whose attributes were changed: says what it is, and what to do.
     pub fn expect(&self, kind: &str) -> Result<Map<String, Value>> {
         self.expect_one_of(&[kind])
     }

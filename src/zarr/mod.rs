@@ -147,11 +147,11 @@ impl Store {
         Ok(Some(result))
     }
 
-    /// Refuses a store that was made anew by another recipe since it was opened to be read: what was read of it would be
-    /// mixed. To be asked when a file of it has been opened; one that is removed or replaced later stays as it was.
+    /// Refuses a store that was made anew by another recipe since it was opened to be read: what was read of it would
+    /// be mixed. To be asked when a file of it has been opened; one that is removed or replaced later stays as it was.
     ///
     /// # Errors
-    /// [`crate::Kind::Input`], and those of reading the attributes.
+    /// [`crate::ErrorKind::Input`], and those of reading the attributes.
     pub(crate) fn expect_unchanged(&self) -> Result<()> {
         let Some(opened) = &self.opened else { return Ok(()) };
         let same = |ours: &Map<String, Value>| ours.get("digest").and_then(Value::as_str) == Some(opened);

@@ -1,8 +1,8 @@
 //! Lossless prediction of the samples of a chunk: what is left packs to a half or a quarter.
 //!
 //! A chunk is [y, x, light, channel]. Each channel becomes its difference from another ([`split`](Kernel::split)),
-//! each sample its difference from what its neighbours in the plane of its light foretell, and that residual its
-//! difference from what the residuals of neighbouring lights foretell ([`mode`]). All arithmetic is on whole
+//! each sample its difference from what its neighbours in the plane of its light predict, and that residual its
+//! difference from what the residuals of neighbouring lights predict ([`mode`]). All arithmetic is on whole
 //! numbers modulo 2^bits, so every kernel gives the same bytes. `docs/reference/codec.md` has it step by step.
 
 mod channels;

@@ -98,7 +98,7 @@ impl Budget {
     }
 
     /// The same for as many clusters as are asked for, or as a search may go up to within memory.
-    pub(super) fn of_first_approach(plan: &Plan, context: &Context<'_>) -> Result<Self> {
+    pub(super) fn of_initial(plan: &Plan, context: &Context<'_>) -> Result<Self> {
         let mut clusters = plan.most_clusters;
         if let Amount::Error(_) = plan.options.amount {
             while clusters > 1 && Self::least(plan, clusters, context.threads) as u64 > context.memory_bytes {
@@ -116,7 +116,7 @@ struct Needs {
 }
 
 impl Needs {
-    /// Those of the first approach and of a pass over all texels.
+    /// Those of the initial clustering and of a pass over all texels.
     fn both(plan: &Plan, clusters: usize, threads: usize) -> [Self; 2] {
         let stride = plan.arrangement.stride();
         // Sources, places, numbers, index now and before, distances.

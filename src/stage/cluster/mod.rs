@@ -1,14 +1,14 @@
 //! Tile to clusters: index, centres, representatives and their distances.
 //!
-//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go passes over growing
+//! Few texels are clustered in memory. Of more, a sample is ([`initial`]), and from its centres go passes over growing
 //! mini-batches ([`batches`]) and all texels ([`pass`]) that read each chunk once. What memory allows never changes a
 //! result: it only says how many bounds and blocks are kept.
 
-mod approach;
 mod batches;
 mod budget;
 pub mod curve;
 mod finish;
+mod initial;
 mod pass;
 mod stream;
 mod taken;
@@ -116,7 +116,7 @@ impl Options {
 /// A step of a clustering that many processes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The first approach, by one process.
+    /// The initial clustering, by one process.
     Prepare,
     /// One process's share of a pass; the latest where none is named.
     Assign(Option<usize>, Shard),
@@ -156,7 +156,7 @@ pub struct Report {
     /// Passes over mini-batches that grew, before these.
     #[serde(default)]
     pub batches: Vec<BatchPass>,
-    /// Texels of the sample that the first approach was made on; 0 where all texels went into memory.
+    /// Texels of the sample that the initial clustering was made on; 0 where all texels went into memory.
     pub sample_texels: usize,
     /// Passes over the sample.
     pub sample_passes: Vec<Pass>,
@@ -197,7 +197,7 @@ pub enum Ended {
 impl Ended {
     fn of(passes: &[Pass], limits: Limits) -> Self {
         if (Limits { passes: usize::MAX, ..limits }).reached(passes) {
-            Self::Settled
+            Self::Converged
         } else if passes.len() >= limits.passes {
             Self::Passes
         } else {
@@ -402,14 +402,14 @@ impl Plan {
         Work::new(self, state.centres.len() / (views * lights), context)
     }
 
-    /// The first approach: the state that the first pass over all texels begins with.
+    /// The initial clustering: the state that the first pass over all texels begins with.
     fn prepare(
         &self,
         passes: &Passes,
         deadline: Option<Instant>,
         context: &Context<'_>,
     ) -> Result<(usize, State)> {
-        let state = self.approach(deadline, context)?;
+        let state = self.initial_clustering(deadline, context)?;
         passes.write_state(0, self.brdf(), &state)?;
         Ok((0, state))
     }

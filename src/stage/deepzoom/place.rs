@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::is_lock;
-use crate::disk::output::{expect_outside_stores, holds, settle};
+use crate::disk::output::{expect_outside_stores, holds, put_in_place};
 use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
@@ -19,7 +19,7 @@ use crate::zarr::storage::MappedStorage;
 use crate::zarr::{FORMAT, Store, metadata};
 
 /// The files of a pyramid.
-pub(super) struct Place {
+pub(super) struct PyramidFiles {
     /// The description, `NAME.dzi`.
     pub(super) description: PathBuf,
     /// The viewer, `NAME.html`.
@@ -30,7 +30,7 @@ pub(super) struct Place {
     ending: &'static str,
 }
 
-impl Place {
+impl PyramidFiles {
     /// The place of a pyramid whose description is called `output`.
     pub(super) fn new(output: &Path, encoding: Encoding) -> Result<Self> {
         let ends = output.extension().is_some_and(|ending| ending == "dzi");
@@ -64,11 +64,11 @@ impl Place {
     /// Checks that nothing lies there, or what the same recipe began, or what may be replaced.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] for another recipe's pyramid, [`crate::Kind::Input`] for other files.
+    /// [`crate::ErrorKind::Recipe`] for another recipe's pyramid, [`crate::ErrorKind::Input`] for other files.
     pub(super) fn check(&self, recipe: &Value, existing: Existing) -> Result<()> {
         expect_outside_stores(&self.description)?;
         match self.compare(recipe) {
-            Err(error) if existing == Existing::Replace && error.kind() == crate::Kind::Recipe => Ok(()),
+            Err(error) if existing == Existing::Replace && error.kind() == crate::ErrorKind::Recipe => Ok(()),
             other => other,
         }
     }
@@ -76,7 +76,7 @@ impl Place {
     fn compare(&self, recipe: &Value) -> Result<()> {
         // A damaged one is another one: it can be replaced on request.
         let state = self.state().map_err(|error| match error.kind() {
-            crate::Kind::Input => {
+            crate::ErrorKind::Input => {
                 Error::recipe(error.to_string()).hint("choose another name, or use --force")
             }
             _ => error,
@@ -150,7 +150,7 @@ impl Place {
 
     /// Removes another recipe's pyramid.
     fn remove_another(&self, recipe: &Value) -> Result<()> {
-        let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::Kind::Recipe);
+        let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::ErrorKind::Recipe);
         if !is_another || !self.folder.join(STATE).is_file() {
             return Ok(());
         }
@@ -173,7 +173,7 @@ impl Place {
     /// Refuses a page or a description that lies there and is another's, before any work.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`]; where it may be replaced, only for what is no file.
+    /// [`crate::ErrorKind::Recipe`]; where it may be replaced, only for what is no file.
     pub(super) fn expect_texts(&self, texts: &[(&Path, String)], existing: Existing) -> Result<()> {
         for (path, text) in texts {
             if path.symlink_metadata().is_err() || holds(path, text.as_bytes())? {
@@ -201,6 +201,6 @@ impl Place {
             Ok(temporary)
         };
         let temporary = written().map_err(|error| Error::io("write", path, error))?;
-        settle(temporary.path(), path, existing).map(drop)
+        put_in_place(temporary.path(), path, existing).map(drop)
     }
 }

@@ -29,7 +29,7 @@ pub struct Options {
     /// The model with the normal map.
     pub model: PathBuf,
     /// Channels together or one by one.
-    pub kind: field::Kind,
+    pub kind: field::CarKind,
     /// Levels of the pyramid; as many as the data carry where absent.
     pub levels: Option<usize>,
     /// What the channels of the field are.
@@ -45,7 +45,7 @@ impl Options {
     pub fn of(model: PathBuf) -> Self {
         Self {
             model,
-            kind: field::Kind::Car3d,
+            kind: field::CarKind::Car3d,
             levels: None,
             coordinates: Coordinates::Normals,
             gains: Gains::Matched,

@@ -11,7 +11,7 @@ use super::{
     of_measured_tile,
 };
 use crate::color::Decoder;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
 use crate::picture::{Meaning, Picture, false_color};
@@ -192,7 +192,7 @@ impl Scene {
     /// Says of an error that something is missing how much of the store is.
     pub(crate) fn explain(&self, error: Error) -> Error {
         match &self.incomplete {
-            Some(told) if error.kind() == Kind::Missing => {
+            Some(told) if error.kind() == ErrorKind::Missing => {
                 let told = told.split("; ").next().unwrap_or_default();
                 let hint = error.guidance().unwrap_or_default().to_owned();
                 Error::missing(format!("{error}: {told}")).hint(hint)
@@ -537,7 +537,7 @@ pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) 
 pub(crate) fn of_stage<T>(model: &Model, stage: Stage, read: impl FnOnce(&Model) -> Result<T>) -> Result<T> {
     model.stage_digest(stage)?;
     read(model).map_err(|error| match error.kind() {
-        Kind::Missing => {
+        ErrorKind::Missing => {
             error.hint(format!("run `btf {}` on the model: it makes again what is missing", stage.name()))
         }
         _ => error,

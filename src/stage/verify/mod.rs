@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::archive::Source;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::Context;
 use crate::stage::deepzoom;
 use crate::store::measurement::Measurement;
@@ -79,8 +79,8 @@ pub struct Beside<'a> {
 /// Reads all of what lies at a path.
 ///
 /// # Errors
-/// Where nothing that can be verified lies there, or its attributes are damaged so far that nothing can be looked at; and
-/// those of the operating system. What else is damaged is reported.
+/// Where nothing that can be verified lies there, or its attributes are damaged so far that nothing can be looked at;
+/// and those of the operating system. What else is damaged is reported.
 pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Found> {
     recognise::expect_readable(path)?;
     let found = if is_pyramid(path) {
@@ -151,8 +151,8 @@ fn kept<T>(result: Result<T>, part: &str, findings: &mut Vec<Finding>) -> Result
         Err(error) => error,
     };
     match error.kind() {
-        Kind::Input | Kind::Missing | Kind::Recipe => {
-            let missing = error.kind() == Kind::Missing;
+        ErrorKind::Input | ErrorKind::Missing | ErrorKind::Recipe => {
+            let missing = error.kind() == ErrorKind::Missing;
             let todo = error.guidance().map(str::to_owned);
             push(findings, Finding { part: part.to_owned(), what: error.to_string(), todo, missing });
             Ok(None)

@@ -67,7 +67,7 @@ impl Measurement {
     /// Starts a measurement, or goes on with one that the same recipe began.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's measurement lies there.
     pub fn create(
         path: &Path,
         description: Description,

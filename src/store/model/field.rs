@@ -16,7 +16,7 @@ use serde_json::{Map, Value, json};
 use crate::error::{Error, Result};
 use crate::method::field::fit::car::Prior;
 use crate::method::field::marginals::{Marginals, Matching, NODES};
-use crate::method::field::{Coordinates, Kind, Level, Model, Surface};
+use crate::method::field::{CarKind, Coordinates, Level, Model, Surface};
 use crate::zarr::metadata::shown;
 use crate::zarr::{Layout, Store};
 
@@ -31,7 +31,7 @@ const MOST_LEVELS: usize = 32;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FieldReport {
     /// `3d` or `2d`.
-    pub mrf: Kind,
+    pub mrf: CarKind,
     /// What the channels are.
     pub field: Coordinates,
     /// What of the tile's distribution is given to a synthesis.
@@ -131,7 +131,7 @@ pub(super) fn arrays(report: &FieldReport) -> Vec<(String, Layout<'static>)> {
         ("mrf/covariance".to_owned(), square_layout(channels)),
         ("mrf/gain".to_owned(), gain_layout(report.levels.len())),
     ];
-    if report.mrf == Kind::Car2d {
+    if report.mrf == CarKind::Car2d {
         arrays.push(("mrf/transform".to_owned(), transform_layout(channels)));
     }
     if report.marginals.is_some() {
@@ -172,13 +172,13 @@ fn marginals_layout() -> Layout<'static> {
     Layout::small::<f32>(&["z1", "z2", "xy"], &[NODES, NODES, 2]).with("z", "-4 to 4 in steps of 1/16")
 }
 
-fn gamma_layout(kind: Kind, channels: usize, sites: usize) -> Layout<'static> {
-    let columns = if kind == Kind::Car3d { channels * sites } else { sites };
+fn gamma_layout(kind: CarKind, channels: usize, sites: usize) -> Layout<'static> {
+    let columns = if kind == CarKind::Car3d { channels * sites } else { sites };
     Layout::small::<f64>(&["field_channel", "coefficient"], &[channels, columns])
 }
 
-fn sigma_layout(kind: Kind, channels: usize) -> Layout<'static> {
-    if kind == Kind::Car3d { square_layout(channels) } else { mean_layout(channels) }
+fn sigma_layout(kind: CarKind, channels: usize) -> Layout<'static> {
+    if kind == CarKind::Car3d { square_layout(channels) } else { mean_layout(channels) }
 }
 
 fn neighbourhood_layout(sites: usize) -> Layout<'static> {
@@ -226,7 +226,7 @@ pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
     };
     let mean = store.read_array::<f64>("mrf/mean", &mean_layout(channels))?;
     let transform =
-        (kind == Kind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
+        (kind == CarKind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
     let covariance = square("mrf/covariance", &square_layout(channels))?;
     let gains = store.read_array::<f64>("mrf/gain", &gain_layout(report.levels.len()))?;
     let levels = report
@@ -257,7 +257,7 @@ fn read_level(
     store: &Store,
     number: usize,
     gain: f64,
-    kind: Kind,
+    kind: CarKind,
     channels: usize,
     report: &LevelReport,
 ) -> Result<Level> {

@@ -395,7 +395,7 @@ impl Model {
     /// Opens an array of a stage.
     fn open_array(&self, stage: Stage, name: &str, layout: &Layout<'_>) -> Result<Array> {
         let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
-            crate::Kind::Missing => {
+            crate::ErrorKind::Missing => {
                 error.hint(format!("run `btf {}` (or `btf model`) on it again", stage.name()))
             }
             _ => error,

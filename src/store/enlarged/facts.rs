@@ -119,11 +119,10 @@ impl Facts {
         if is_new && (facts.clusters.is_none() || facts.tile.is_none()) {
             return Err(refused("clusters or tile: none".to_owned()));
         }
-        if facts.clusters.is_some_and(|clusters| !(1..=MOST_CLUSTERS).contains(&clusters)) {
-            return Err(refused(format!(
-                "clusters: got {:?}, expected 1 to {MOST_CLUSTERS}",
-                facts.clusters
-            )));
+        if let Some(clusters) = facts.clusters
+            && !(1..=MOST_CLUSTERS).contains(&clusters)
+        {
+            return Err(refused(format!("clusters: got {clusters}, expected 1 to {MOST_CLUSTERS}")));
         }
         let sides = facts.recipe.size.iter().chain(facts.tile.iter().flatten());
         match sides.clone().find(|side| !(1..=MOST_SIDE).contains(*side)) {

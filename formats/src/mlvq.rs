@@ -89,7 +89,7 @@ fn assumptions(resolved: Resolved) -> Vec<String> {
     ];
     let Resolved { known, by_rule } = resolved;
     if known > 0 {
-        list.push(format!("{known} ambiguous zero bytes of the tables were resolved as the caller said."));
+        list.push(format!("{known} ambiguous zero bytes of the tables were read as zero_bytes.txt says."));
     }
     if by_rule > 0 {
         list.push(format!(

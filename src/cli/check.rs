@@ -12,6 +12,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::each::{Ended, Line, Outcome, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -44,7 +45,7 @@ pub(super) struct Check {
 }
 
 impl Check {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         if self.paths.len() > 1 && !self.pieces {
             if self.picture.is_some() {
@@ -53,10 +54,10 @@ impl Check {
             }
             let name = |path: &PathBuf| path.display().to_string();
             return each(&self.paths, name, self.json, context, console, |path| {
-                self.one_of_many(path, context)
+                self.one_of_many(path, given, context)
             });
         }
-        let Examined { statistics, report, notes } = self.examine(&self.paths, context)?;
+        let Examined { statistics, report, notes } = self.examine(&self.paths, given, context)?;
         if self.json {
             console.plan(&with_notes(&report, &notes)?)?;
         } else {
@@ -71,9 +72,10 @@ impl Check {
     }
 
     /// Examines one input, which may lie in pieces.
-    fn examine(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Examined> {
+    fn examine(&self, paths: &[PathBuf], given: &Given, context: &Context<'_>) -> Result<Examined> {
         let path = first(paths);
         if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
+            given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
             // One that was made by an older version, or crafted, may not say how it was read.
@@ -88,8 +90,8 @@ impl Check {
         Ok(Examined { statistics, report, notes: btfkit::archive::notes(source.as_ref()) })
     }
 
-    fn one_of_many(&self, path: &PathBuf, context: &Context<'_>) -> Result<Outcome> {
-        let Examined { report, notes, .. } = self.examine(std::slice::from_ref(path), context)?;
+    fn one_of_many(&self, path: &PathBuf, given: &Given, context: &Context<'_>) -> Result<Outcome> {
+        let Examined { report, notes, .. } = self.examine(std::slice::from_ref(path), given, context)?;
         let suspected: Vec<&str> = report.findings().map(|finding| finding.code).collect();
         let line = if self.json {
             Line::Json(with_notes(&report, &notes)?)

@@ -10,6 +10,7 @@ use btfkit::stage::import::Shard;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
+use super::given::Given;
 use super::tile::Seed;
 use super::{Console, bytes_text, number};
 
@@ -28,7 +29,7 @@ pub(super) struct ClusterOptions {
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
     /// Stop after this many passes over the texels
-    #[arg(long, default_value_t = Limits::default().passes)]
+    #[arg(long, default_value_t = Limits::default().passes, value_parser = number::count)]
     passes: usize,
     /// Stop when a pass lowers the error by less than this share
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
@@ -119,8 +120,9 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
         let Self { measurement, model, options, seed, .. } = self;
+        self.refuse_idle(given)?;
         if self.dry_run {
             return match &options.clusters_of {
                 Some(from) => console.plan(&taken_plan(model, from)?.summary()),
@@ -140,6 +142,21 @@ impl Cluster {
                 console
                     .line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses options that would change nothing.
+    fn refuse_idle(&self, given: &Given) -> Result<()> {
+        match self.step {
+            Some(StepName::Prepare) => given.refuse_these(&["pass", "shard"], "in --step prepare")?,
+            Some(StepName::Reduce) => {
+                given.refuse_these(&["shard"], "in --step reduce, which is one process")?
+            }
+            _ => {}
+        }
+        if self.options.clusters_of.is_some() {
+            given.refuse_these(&["seed"], "beside --clusters-of: nothing is drawn at random")?;
         }
         Ok(())
     }
@@ -183,17 +200,26 @@ fn cluster_plan(
     options: &ClusterOptions,
     seed: u64,
 ) -> Result<cluster::Plan> {
+    cluster::plan(&cluster_options(measurement, model, options, seed))
+}
+
+pub(super) fn cluster_options(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+) -> cluster::Options {
     let centre = match options.centre {
         Centre::Median => CentreRule::Median,
         Centre::Mean => CentreRule::Mean,
     };
-    let limits = Limits { passes: options.passes.max(1), tolerance: options.tolerance };
+    let limits = Limits { passes: options.passes, tolerance: options.tolerance };
     let amount = match (options.clusters, options.error, options.ratio) {
         (_, Some(error), _) => Amount::Error(error),
         (_, _, Some(ratio)) => Amount::Ratio(ratio),
         (clusters, ..) => clusters.map_or(Amount::Usual, Amount::Clusters),
     };
-    cluster::plan(&cluster::Options {
+    cluster::Options {
         measurement: measurement.into(),
         model: model.into(),
         amount,
@@ -207,8 +233,11 @@ fn cluster_plan(
         restarts: options.restarts,
         seed,
         time: options.time.map(Duration::from_secs),
-    })
+    }
 }
+
+/// A mean |dL*| above this is seen by everybody.
+const LARGE: f64 = 3.0;
 
 pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
@@ -217,6 +246,12 @@ pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
         (0, all) => format!("after {}", counted(all, "pass")),
         (batches, all) => {
             format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
+        }
+    };
+    // Told behind the rest, whichever of the two.
+    let tell_error = || {
+        if report.representative_lightness_error > LARGE {
+            console.line("          a large error: more clusters leave less of it (--clusters N; btf curve shows how much)");
         }
     };
     let stored = report.representative_bytes + report.index_bytes;
@@ -228,7 +263,9 @@ pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
             "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
             report.clusters
         );
-        return console.stage("clusters", &text);
+        console.stage("clusters", &text);
+        tell_error();
+        return;
     }
     let how = taken
         .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
@@ -252,4 +289,5 @@ pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
         ratio(report.tile_bytes),
         ratio(report.measurement_bytes)
     ));
+    tell_error();
 }

@@ -1,13 +1,18 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, ErrorKind, Result};
+use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::stage::export::{self, Format};
 use btfkit::store::measurement::Measurement;
 use clap::{Args, ValueEnum};
 
 use super::deepzoom::Deepzoom;
+use super::given::Given;
 use super::{Console, bytes_text, found};
+
+/// Where it is said which options have an effect.
+const WHICH: &str = "; btf export --help says which options are for which formats";
 
 /// Write a measurement for other programs (zip, EXR, PNG, HDF5, npy, Bonn), or a picture to zoom into (Deep Zoom)
 #[derive(Args)]
@@ -39,9 +44,6 @@ pub(super) struct Export {
     quality: Option<u8>,
     #[command(flatten)]
     deepzoom: Deepzoom,
-    /// The options that were given, by their names.
-    #[arg(skip)]
-    given: Vec<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -56,26 +58,16 @@ enum FormatName {
 }
 
 impl Export {
-    /// Takes note of the options that were given on the command line.
-    pub(super) fn note_given(&mut self, given: Vec<String>) {
-        self.given = given;
+    /// Whether the same command goes on where it was stopped: tiles are kept.
+    pub(super) fn goes_on(&self) -> bool {
+        self.to.is_none() && self.deepzoom.is_meant(&self.output)
     }
 
-    /// Refuses options that would change nothing.
-    fn refuse_idle(&self, what: &str, is_idle: impl Fn(&str) -> bool) -> Result<()> {
-        match self.given.iter().find(|name| is_idle(name)) {
-            None => Ok(()),
-            Some(name) => {
-                Err(Error::usage(format!("--{} changes nothing in {what}", name.replace('_', "-")))
-                    .hint("leave it out; btf export --help says which options are for which formats"))
-            }
-        }
-    }
-
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
-        if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
+        if self.goes_on() {
             let is_idle = |name: &str| name == "rank" || name == "quality" && !self.deepzoom.is_jpeg();
-            self.refuse_idle("a Deep Zoom pyramid like this one", is_idle)?;
+            given.refuse(is_idle, "in a Deep Zoom pyramid like this one", WHICH)?;
+            self.deepzoom.refuse_idle(given, &self.store)?;
             return self.deepzoom.run(&self.store, &self.output, self.quality, context, console);
         }
         let format = match self.to {
@@ -87,11 +79,19 @@ impl Export {
             Some(FormatName::Dfmf) => Format::Dfmf,
             Some(FormatName::Fmf) => Format::Fmf,
             None => of_name(&self.output).ok_or_else(|| {
-                Error::new(
+                let error = Error::new(
                     ErrorKind::Usage,
                     format!("{}: no format goes by this name", self.output.display()),
-                )
-                .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
+                );
+                let formats = "--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf";
+                match Ending::of(&self.output, &Ending::ALL) {
+                    Ok(_) => error.hint(format!(
+                        "one picture: btf image {} --out {}; all of a measurement: {formats}",
+                        self.store.display(),
+                        self.output.display()
+                    )),
+                    Err(_) => error.hint(formats),
+                }
             })?,
         };
         if self.output.extension().is_some_and(|ending| ending == "dzi") {
@@ -107,11 +107,9 @@ impl Export {
             Format::Npy => ("a numpy array", ""),
             Format::Hdf5 => ("an HDF5 file", ""),
         };
-        let zoom = Deepzoom::augment_args(clap::Command::new(""));
-        self.refuse_idle(what, |name| {
-            ["rank", "quality"].contains(&name) && name != used
-                || zoom.get_arguments().any(|argument| argument.get_id() == name)
-        })?;
+        let is_idle = |name: &str| ["rank", "quality"].contains(&name) && name != used;
+        given.refuse(is_idle, &format!("in {what}"), WHICH)?;
+        given.refuse_all::<Deepzoom>(&format!("in {what}"), WHICH)?;
         let measurement = Measurement::open(&self.store)?;
         let options = export::Options {
             output: self.output.clone(),

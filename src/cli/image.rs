@@ -6,6 +6,7 @@ use btfkit::run::Context;
 use btfkit::stage::image;
 use clap::{Args, ValueEnum};
 
+use super::given::{Given, kind_at};
 use super::scene::SceneArgs;
 use super::{Console, found};
 
@@ -61,12 +62,27 @@ enum What {
 }
 
 impl Image {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
         let subject = match self.what {
             What::Appearance => image::Subject::Appearance { view: self.scene.view, light: self.scene.light },
             What::Index => image::Subject::Index,
             What::Normals => image::Subject::Normals,
         };
+        self.scene.refuse_idle(given, &self.source, matches!(self.what, What::Appearance))?;
+        let ending = Ending::of(&self.out, &Ending::ALL).map_err(|error| match kind_at(&self.out) {
+            Some(_) => error.hint(format!(
+                "--out names the picture, not the store: btf image {} --out {}",
+                self.out.display(),
+                self.source.display()
+            )),
+            None => error,
+        })?;
+        if ending != Ending::Jpeg {
+            given.refuse_these(&["quality"], "in this format: it is that of a JPEG")?;
+        }
+        if ending == Ending::Exr {
+            given.refuse_these(&["bits"], "in an EXR, which holds linear floats")?;
+        }
         let options = self.scene.options(&self.source, subject);
         let bits = match self.bits {
             BitsName::Eight => Bits::Eight,

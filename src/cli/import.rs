@@ -8,9 +8,11 @@ use btfkit::store::measurement::Description;
 use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
 use btfkit::zarr::codec::Chain;
+use btfkit_formats::SampleType;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::given::kind_at;
 use super::outputs::wanted_twice;
 use super::source::SourceArgs;
 use super::{Console, bytes_text, number};
@@ -78,6 +80,9 @@ impl Import {
         if let Some(absent) = self.paths.iter().find(|path| !(path.exists() || is_new(path))) {
             expect_readable(absent)?;
             let error = Error::missing(format!("{}: no such archive", absent.display()));
+            if is_store(absent) {
+                return Err(error.hint("archives come first, and the store to make is named last"));
+            }
             return Err(
                 if self.into.is_none() && self.paths.len() > 1 && Some(absent) == self.paths.last() {
                     error.hint("the store to make is named last, and ends in .zarr")
@@ -114,7 +119,20 @@ impl Import {
         context: &Context<'_>,
         console: Console,
     ) -> Result<Option<(Description, Report, Vec<String>)>> {
-        let source = self.source.open(&job.pieces)?;
+        if let Some((store, kind)) = job.pieces.iter().find_map(|piece| Some((piece, kind_at(piece)?))) {
+            let what = format!("{} is a store already (a {kind}), expected an archive", store.display());
+            return Err(
+                Error::usage(what).hint("copy it as a folder, or name the archive that it was made of")
+            );
+        }
+        let source = self.source.open(&job.pieces).map_err(|error| match job.pieces.as_slice() {
+            // Of several names the last may have been meant for the stores.
+            [folder] if self.paths.len() > 1 && self.paths.last() == Some(folder) && folder.is_dir() => {
+                let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
+                error.hint(format!("{todo}if stores are to be put there: --into {}", folder.display()))
+            }
+            _ => error,
+        })?;
         let options = import::Options {
             store: job.store.clone(),
             white: self.white,
@@ -127,8 +145,20 @@ impl Import {
             return Ok(None);
         }
         let report = plan.run(context)?;
+        let samples = plan.description().sample_type;
+        let is_cut = report.samples.clipped > 0
+            && matches!(samples, SampleType::U8 | SampleType::U16)
+            && (self.white - 1.0).abs() < f64::EPSILON;
+        let lost = is_cut.then(|| {
+            format!(
+                "{} above white became white, as {} samples hold no more: --samples f16 keeps them",
+                counted(report.samples.clipped, "sample"),
+                samples.name()
+            )
+        });
         let assumed = source.contents().assumptions.iter().map(|text| format!("assumed: {text}"));
-        let remarks = btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).collect();
+        let remarks =
+            btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).chain(lost).collect();
         Ok(Some((plan.description().clone(), report, remarks)))
     }
 

@@ -9,7 +9,7 @@ use clap::Args;
 
 use super::Console;
 use super::appearance::{appearance_plan, print_appearance};
-use super::cluster::{ClusterOptions, print_clusters, run_clusters};
+use super::cluster::{ClusterOptions, cluster_options, print_clusters, run_clusters};
 use super::each::{Ended, Line, each};
 use super::fit::{FitOptions, fit_plan, print_field};
 use super::normals::{NormalsOptions, normals_plan, print_normals};
@@ -81,6 +81,10 @@ impl Model {
             let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
             context.progress.stage(Some(stage));
         };
+        context.tell_enough(plan.enough_for_model(
+            &cluster_options(measurement, model, &self.cluster, self.seed.seed),
+            context.threads,
+        ));
         // A line may be told only while no bar is drawn.
         let console = console.brief();
         let print = |found: bool, print: &dyn Fn(Console)| {

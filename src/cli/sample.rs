@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use btfkit::error::Result;
+use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::sample::{MOST_SIDE, MaterialKind};
 use btfkit::shape::Size;
@@ -62,6 +62,12 @@ impl From<Material> for MaterialKind {
 
 impl Sample {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        if self.archive.extension().is_some_and(|ending| ending == "zarr") {
+            let archive = self.archive.with_extension("zip");
+            let (named, archive) = (self.archive.display(), archive.display());
+            return Err(Error::usage(format!("{named}: btf sample writes a zip, which is no store"))
+                .hint(format!("btf sample {archive}, then btf import {archive} {named}")));
+        }
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),

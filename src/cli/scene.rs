@@ -1,11 +1,14 @@
 use std::path::{Path, PathBuf};
 
+use btfkit::error::Result;
 use btfkit::method::coherent::JITTER_ONE;
 use btfkit::shape::Area;
 use btfkit::stage::image::{Options, PlaneOptions, Subject, Values};
+use btfkit::store::{measurement, model};
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
+use super::given::{Given, kind_at};
 use super::number;
 
 /// What a picture shows.
@@ -55,6 +58,27 @@ enum ValuesName {
 }
 
 impl SceneArgs {
+    /// Refuses options that would change nothing of what is shown of a store; `is_lit` says whether that has a light.
+    pub(super) fn refuse_idle(&self, given: &Given, source: &Path, is_lit: bool) -> Result<()> {
+        if !is_lit {
+            let lit = ["light", "view", "exposure", "values", "measurement"];
+            given.refuse_these(&lit, "in a picture of cluster numbers or of normals, which has no light")?;
+        }
+        if matches!(self.values, Some(ValuesName::Model)) {
+            given
+                .refuse_these(&["measurement"], "beside --values model: values are those of the clusters")?;
+        }
+        match kind_at(source) {
+            Some(measurement::KIND) => given.refuse_these(
+                &["values", "measurement", "model"],
+                "in a picture of a measurement, which has its own values",
+            ),
+            Some(model::KIND) => given
+                .refuse_these(&["model"], "in a picture of a model: it names the model of an enlargement"),
+            _ => Ok(()),
+        }
+    }
+
     pub(super) fn options(&self, source: &Path, subject: Subject) -> Options {
         Options {
             source: source.to_owned(),

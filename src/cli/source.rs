@@ -1,6 +1,6 @@
 //! What a reader of archives is told at the command line; the same for every command that reads one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
 use btfkit::archive::{self, Source};
@@ -121,6 +121,26 @@ impl SourceArgs {
     /// Opens the archive at one path, or in pieces at several.
     pub(super) fn open(&self, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         paths.iter().try_for_each(|path| expect_readable(path))?;
-        archive::open(paths, &self.options())
+        archive::open(paths, &self.options()).map_err(|error| match paths {
+            [folder] if holds_archives(folder) => {
+                let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
+                let each = folder.join("*");
+                error.hint(format!(
+                    "{todo}if its archives are a measurement each, name them: {}",
+                    each.display()
+                ))
+            }
+            _ => error,
+        })
     }
+}
+
+/// Whether a folder holds several archives that are one file each.
+fn holds_archives(folder: &Path) -> bool {
+    const ENDINGS: [&str; 7] = ["zip", "btf", "h5", "hdf5", "npy", "big", "mif"];
+    let is_archive = |path: PathBuf| {
+        path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|entry| is_archive(entry.path())).take(2).count() > 1
 }

@@ -8,6 +8,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -45,7 +46,10 @@ pub(super) struct Verify {
 }
 
 impl Verify {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
+        if self.archive.is_empty() {
+            given.refuse_all::<SourceArgs>("without --source: it says how an archive is read", "")?;
+        }
         let [store] = self.stores.as_slice() else {
             if !self.archive.is_empty() {
                 return Err(Error::usage(format!("got --source for {} stores", self.stores.len()))

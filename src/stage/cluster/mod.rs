@@ -37,7 +37,9 @@ use crate::store::model::clusters::ClusterRecipe;
 pub use crate::store::model::clusters::{ClusterReport as Report, Ended};
 use crate::store::model::tile::TileRecipe;
 use crate::store::model::{Model, Stage};
+use crate::store::origin;
 use crate::words::counted;
+pub(crate) use budget::enough_bytes;
 use pass::{Next, Work};
 pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
 
@@ -176,14 +178,22 @@ pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Re
     let (expected, found) = (measurement_of(model)?, measurement.digest());
     let Some(expected) = expected.filter(|expected| expected != found) else { return Ok(()) };
     let [expected, found] = [expected.as_str(), found].map(recipe::shortened);
+    // Where the model says that its measurement lies, another one is the same imported anew.
+    let real = |path: &Path| path.canonicalize().ok();
+    let name = measurement_name(model.path());
+    let places = origin::places(model.path(), origin::MEASUREMENT, name.to_str());
+    let anew = places.iter().any(|place| real(place).is_some() && real(place) == real(measurement.path()));
     let (model, measurement) = (model.path().display(), measurement.path().display());
+    let todo = if anew {
+        format!("make the model anew of what it is now: btf model {measurement} {model} --force")
+    } else {
+        "name the measurement that the model was made of, or the model of this measurement".to_owned()
+    };
     Err(Error::recipe(format!(
         "{measurement} is not what {model} was made of: it was imported anew since in another way, or is another \
          measurement (digest {expected}, now {found})"
     ))
-    .hint(format!(
-        "name the measurement that it was made of, or make the model anew: btf model {measurement} {model} --force"
-    )))
+    .hint(todo))
 }
 
 /// The name that the measurement of a model has by default: `wood.zarr` of `wood.model.zarr`.

@@ -95,7 +95,7 @@ impl Plan {
         };
         context.progress.begin("fit", 1, Counted::Items("field"));
         let tile = self.model.tile()?;
-        let needed = FIXED_BYTES + TEXEL_BYTES * tile.size.texels() as u64;
+        let needed = memory_bytes(tile.size.texels());
         context.require(&format!("fitting the field of a tile of {}", tile.size), needed)?;
         let normals = self.model.normals()?;
         let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
@@ -110,6 +110,11 @@ impl Plan {
         context.progress.end();
         Ok(report)
     }
+}
+
+/// Memory that fitting a tile of so many texels takes.
+pub(crate) fn memory_bytes(texels: usize) -> u64 {
+    FIXED_BYTES + TEXEL_BYTES * texels as u64
 }
 
 /// The statistics of a fitted model's tile and of a synthesis.

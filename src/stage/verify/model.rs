@@ -62,7 +62,9 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             report.keep("centres", model.centres())?;
             report.keep("representative_texel", model.representative_texels())?;
             // Where it cannot be told how many there are, that has been found.
-            if let Ok(clusters) = model.clusters().map(|clusters| clusters as u64) {
+            let clusters = model.clusters().map(|clusters| clusters as u64);
+            // What is not all there is not read, whatever it claims to be.
+            if let (Ok(clusters), true) = (clusters, model.has_arrays(stage)?) {
                 let distances = format!("verifying the distances of {}", counted(clusters, "cluster"));
                 // As they are read and as they are packed.
                 context.require(&distances, clusters * clusters * 8)?;

@@ -74,10 +74,14 @@ impl Model {
     }
 
     pub(super) fn done(&self, stage: Stage) -> Result<Entry> {
-        self.entry(stage)?.ok_or_else(|| {
+        self.store.expect_unchanged()?;
+        let entry = self.entry(stage)?.ok_or_else(|| {
             Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
                 .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
-        })
+        })?;
+        self.store.see(stage.name(), &entry.digest);
+        self.store.expect_unchanged()?;
+        Ok(entry)
     }
 
     /// Whether a stage is done, by whatever recipe.
@@ -209,6 +213,7 @@ impl Model {
                 }
             }
             self.write_root(attributes, entries)?;
+            stage.builders().iter().chain([&stage]).for_each(|taken| self.store.forget(taken.name()));
         }
         for array in arrays {
             self.store.remove(&array)?;

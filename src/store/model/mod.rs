@@ -48,7 +48,10 @@ impl Model {
     /// Opens a model for reading.
     pub fn open(path: &Path) -> Result<Self> {
         let model = Self { store: Store::open(path, KIND)?.0 };
-        model.entries()?;
+        // Everything else of a model is read by what its tile says.
+        if model.has(Stage::Tile)? {
+            model.done(Stage::Tile)?;
+        }
         Ok(model)
     }
 

@@ -190,8 +190,27 @@ pub(crate) fn is_loop(error: &std::io::Error) -> bool {
     error.raw_os_error() == Some(LOOP)
 }
 
+/// What to do where the system starts no more threads.
+pub(crate) const NO_THREADS: &str =
+    "choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)";
+
+/// Whether an operating system's error has this number; the numbers of Linux and of the systems after BSD are the same.
+fn is_number(error: &std::io::Error, numbers: &[i32]) -> bool {
+    error.raw_os_error().is_some_and(|number| numbers.contains(&number))
+}
+
 /// What to do about what the operating system refused.
 pub(crate) fn advice(error: &std::io::Error, reading: bool) -> Option<&'static str> {
+    /// `ENFILE` and `EMFILE`: the system or this process has too many files open.
+    const TOO_MANY_FILES: [i32; 2] = [23, 24];
+    /// `EAGAIN`, of Linux and of BSD: no more threads or locks.
+    const TOO_MANY_THREADS: [i32; 1] = [if cfg!(target_os = "linux") { 11 } else { 35 }];
+    if is_number(error, &TOO_MANY_FILES) {
+        return Some("too many files are open: raise the limit (ulimit -n 1024), or choose fewer --threads");
+    }
+    if is_number(error, &TOO_MANY_THREADS) {
+        return Some(NO_THREADS);
+    }
     match error.kind() {
         io::ErrorKind::StorageFull => Some("free some space and run the same command again"),
         io::ErrorKind::QuotaExceeded => {

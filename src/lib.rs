@@ -64,7 +64,7 @@
 //!
 //! # Errors
 //!
-//! Every error has a [`Kind`], which decides the exit code of the program, a message that names the file and the place
+//! Every error has a [`ErrorKind`], which decides the exit code of the program, a message that names the file and the place
 //! in it, and often a hint what to do ([`Error::guidance`]).
 //!
 //! | kind | meaning | exit code |

@@ -90,7 +90,7 @@ fn assumptions(resolved: Resolved) -> Vec<String> {
     ];
     let Resolved { known, by_rule } = resolved;
     if known > 0 {
-        list.push(format!("Ambiguous zero bytes of the tables, resolved as the caller said: {known}."));
+        list.push(format!("Ambiguous zero bytes of the tables, read as zero_bytes.txt says: {known}."));
     }
     if by_rule > 0 {
         list.push(format!(

@@ -13,7 +13,7 @@ use super::Console;
 /// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
 const FEW_CELLS: u64 = 4;
 
-/// Prepare a model for `btf enlarge`: how the surroundings of each texel look
+/// Prepare a model for `btf enlarge`: describe how the surroundings of each texel look
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -22,7 +22,8 @@ Example:
 pub(super) struct Appearance {
     /// The model with the clusters
     model: PathBuf,
-    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    /// Steps from cell to cell of a regular material, in texels: dy,dx;dy,dx (weaves), dy,dx (ribs), none, or auto
+    /// (found in the pictures)
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     lattice: LatticeChoice,
     /// Print what would be done, and do nothing

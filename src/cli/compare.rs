@@ -1,8 +1,10 @@
 use std::path::PathBuf;
 
 use btfkit::error::{Error, Result};
+use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
+use btfkit::shape::Size;
 use btfkit::stage::{compare, image};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
@@ -13,7 +15,7 @@ use clap::Args;
 use super::Console;
 use super::table::{row, table};
 
-/// Compare a model with its measurement over the tile: errors in lightness and colour
+/// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -27,13 +29,13 @@ pub(super) struct Compare {
     /// or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Light of the picture: theta,phi in degrees
-    #[arg(long, default_value = "15,0", allow_hyphen_values = true)]
+    /// Direction of the light, theta,phi in degrees: theta from the normal, phi counter-clockwise from the right
+    #[arg(long, requires = "picture", default_value = "15,0", allow_hyphen_values = true)]
     light: Direction,
-    /// View of the picture
-    #[arg(long, default_value = "0,0", allow_hyphen_values = true)]
+    /// Direction of the view, theta,phi in degrees
+    #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// Print the figures as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -42,7 +44,8 @@ impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
-        let report = compare::run(&options, context)?;
+        let (model, measurement) = compare::open(&options)?;
+        let report = compare::run(&model, &measurement, context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
             console.plan(&value)?;
@@ -76,22 +79,51 @@ impl Compare {
             }
         }
         match &self.picture {
-            Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),
+            Some(path) => {
+                self.side_by_side(&model, &measurement, context)?.write(path, context.existing)?;
+                if !self.json {
+                    let description = measurement.description();
+                    let measured = [&description.views[..], &description.lights];
+                    console.notes(&image::notes_of_directions(measured, self.view, self.light));
+                }
+                Ok(())
+            }
             None => Ok(()),
         }
     }
 
-    fn side_by_side(&self, context: &Context<'_>) -> Result<Picture> {
-        let model = Model::open(&self.model)?;
-        let measurement = Measurement::open(&self.measurement)?;
+    fn side_by_side(
+        &self,
+        model: &Model,
+        measurement: &Measurement,
+        context: &Context<'_>,
+    ) -> Result<Picture> {
         let tile = model.tile()?;
-        let measured = image::of_measured_tile(&measurement, &tile, self.view, self.light, context)?;
-        let colors = image::cluster_colors(&model, self.view, self.light)?;
+        let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
+        let colors = image::cluster_colors(model, self.view, self.light)?;
         let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]
             .map(|picture| picture.magnified(factor));
-        Ok(Picture::side_by_side(&shown, 8))
+        Ok(captioned(&["measured", "model", "difference x 4"], &shown))
     }
+}
+
+/// Pictures of one size side by side, each under its caption.
+fn captioned(captions: &[&str], pictures: &[Picture]) -> Picture {
+    /// Pixels between pictures, and around captions.
+    const GAP: usize = 8;
+    let widths = captions.iter().map(|caption| text_size(1, caption).width);
+    let sizes = pictures.iter().map(|picture| picture.size);
+    let column = widths.chain(sizes.clone().map(|size| size.width)).max().unwrap_or(0);
+    let below = CHARACTER + 2 * GAP;
+    let height = below + sizes.map(|size| size.height).max().unwrap_or(0);
+    let mut sheet = Canvas::new(Size::new(height, pictures.len() * (column + GAP)));
+    for (number, (caption, picture)) in captions.iter().zip(pictures).enumerate() {
+        let left = number * (column + GAP);
+        sheet.text(GAP, left, caption);
+        sheet.put(below, left, picture);
+    }
+    sheet.into_picture()
 }

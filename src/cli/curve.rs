@@ -12,7 +12,7 @@ use clap::Args;
 use super::table::{row, table};
 use super::{Console, bytes_text};
 
-/// Show the error and the compression for each number of clusters
+/// Show the error and the compression that 1, 2, 4, 8 ... clusters would give
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -27,16 +27,16 @@ pub(super) struct Curve {
     measurement: PathBuf,
     /// The model with the tile
     model: PathBuf,
-    /// Also draw a chart: .png, .jpg, .webp or .tif
+    /// Also write a chart: .png, .jpg, .webp or .tif
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print the curve as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
-    /// Most clusters; never more than a quarter of the texels
+    /// The largest number of clusters to try; never more than a quarter of the texels
     #[arg(long, default_value_t = 1024, value_name = "N")]
     most: usize,
-    /// Seed of the first centres and of the sample
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
 }

@@ -9,6 +9,7 @@ use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::Console;
+use super::given::Given;
 use super::scene::SceneArgs;
 
 /// JPEG quality of tiles, unless one is given.
@@ -35,7 +36,7 @@ pub(super) struct Deepzoom {
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
-    /// Print what was done as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -50,6 +51,11 @@ impl Deepzoom {
     /// Whether it is meant.
     pub(super) fn is_meant(&self, output: &Path) -> bool {
         self.deepzoom || output.extension().is_some_and(|ending| ending == "dzi")
+    }
+
+    /// Refuses options that would change nothing.
+    pub(super) fn refuse_idle(&self, given: &Given, source: &Path) -> Result<()> {
+        self.scene.refuse_idle(given, source, true)
     }
 
     /// Whether tiles are JPEGs, which have a quality.

@@ -9,18 +9,18 @@ use super::Console;
 use super::sample::Material;
 use super::table::{row, table};
 
-/// Run the whole method on a synthetic material, and make a page of pictures
+/// Run the whole method on a synthetic material, and make a page of pictures that explains it
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf demo
   btf demo wood-demo --material wood
-Takes about a minute and 1 GB of disk. Interrupted, the same command goes on.")]
+It takes about a minute and 1 GB of disk. If it is interrupted, run the same command again.")]
 pub(super) struct Demo {
     /// Folder for all results
     #[arg(default_value = "demo")]
     folder: PathBuf,
-    /// Which material
+    /// The material
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
 }

@@ -15,21 +15,21 @@ use clap::{Args, ValueEnum};
 use super::Console;
 use super::table::{row, table};
 
-/// Fit a random field to a model's normal map, for `btf enlarge --method paper`
+/// Fit a random field to a model's normal map; needed for `btf enlarge --method paper` only
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf fit wood.model.zarr
   btf fit wood.model.zarr --mrf 2d --field slopes --report wood-field
   btf fit wood.model.zarr --gains none --marginals none           the paper as it is written
---report NAME synthesises 512x512 normals and writes how like the tile's they are: the distribution of each
-component, autocorrelation and spread in each band of the pyramid, as NAME.txt and NAME.png.")]
+--report NAME draws 512x512 normals from the field and compares them with those of the tile: the distribution of each
+component, autocorrelation, and the spread in each band of the pyramid. It writes NAME.txt and NAME.png.")]
 pub(super) struct Fit {
     /// The model with the normal map
     model: PathBuf,
     #[command(flatten)]
     options: FitOptions,
-    /// Compare a synthesis with the tile, and write the result to NAME.txt and NAME.png
+    /// Also draw normals from the field, compare them with the tile's, and write NAME.txt and NAME.png
     #[arg(long, value_name = "NAME")]
     report: Option<PathBuf>,
     /// Print what would be done, and do nothing
@@ -39,20 +39,20 @@ pub(super) struct Fit {
 
 #[derive(Args)]
 pub(super) struct FitOptions {
-    /// Random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
+    /// Kind of random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
     #[arg(long, value_enum, default_value = "3d")]
     mrf: CarKind,
-    /// Levels of the pyramid [default: 1 to 5, whichever keeps the autocovariance best]
+    /// Number of levels of the pyramid [default: 1 to 5, the one that keeps the autocovariance best]
     #[arg(long)]
     levels: Option<usize>,
-    /// What to model: the three components of the normals, or two slopes
+    /// What the field describes: the three components of the normals, or two slopes
     #[arg(long, value_enum, default_value = "normals")]
     field: Field,
-    /// Variance of each level: matched, so that the sum of all levels has that of the tile; or none, as estimated
+    /// How to scale levels: matched, so that their sum varies as much as the tile does; or none, as in the paper
     #[arg(long, value_enum, default_value = "matched")]
     gains: Gains,
-    /// Which distribution of the tile's normals a synthesis keeps: the joint one of n_x and n_y, that of each, or none,
-    /// as in the paper
+    /// Which distribution of the tile's normals is kept: the joint one of n_x and n_y (joint), that of each (channel),
+    /// or neither, as in the paper (none)
     #[arg(long, value_enum, default_value = "joint")]
     marginals: Marginals,
 }

@@ -17,12 +17,13 @@ use super::terminal::{of_output, pieces};
 use super::{Cli, Console};
 
 /// Commands by what they are for, in the order of the work.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Convert", &["import", "export", "sample"]),
+const GROUPS: [(&str, &[&str]); 7] = [
+    ("Try", &["demo", "sample"]),
+    ("Convert", &["import", "export"]),
     ("Check", &["info", "check", "verify"]),
     ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
     ("Enlarge", &["enlarge", "judge"]),
-    ("Look", &["image", "demo"]),
+    ("Look", &["image"]),
     ("Set up", &["completions", "man", "help"]),
 ];
 
@@ -126,7 +127,7 @@ impl Completions {
     }
 }
 
-/// Print a manual page, or write all of them into a folder
+/// Print a manual page, or write all pages into a folder
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

@@ -9,14 +9,14 @@ use clap::Args;
 
 use super::Console;
 use super::appearance::{appearance_plan, print_appearance};
-use super::cluster::{ClusterOptions, print_clusters, run_clusters};
+use super::cluster::{ClusterOptions, cluster_options, print_clusters, run_clusters};
 use super::each::{Ended, Line, each};
 use super::fit::{FitOptions, fit_plan, print_field};
 use super::normals::{NormalsOptions, normals_plan, print_normals};
 use super::outputs::{Naming, Pair};
 use super::tile::{Seed, TileOptions, print_tile, tile_plan};
 
-/// Make a model of a measurement: tile, clusters, normals, random field and appearance in one go
+/// Make a model of a measurement: runs tile, cluster, normals, fit and appearance
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -33,18 +33,18 @@ pub(super) struct Model {
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
     #[command(flatten)]
-    tile: TileOptions,
-    #[command(flatten)]
-    cluster: ClusterOptions,
-    #[command(flatten)]
-    normals: NormalsOptions,
-    #[command(flatten)]
-    fit: FitOptions,
-    #[command(flatten)]
     seed: Seed,
-    /// Print what would be done first, and do nothing
+    /// Print what the first stage would do, and do nothing
     #[arg(long)]
     dry_run: bool,
+    #[command(flatten, next_help_heading = "Tile")]
+    tile: TileOptions,
+    #[command(flatten, next_help_heading = "Clusters")]
+    cluster: ClusterOptions,
+    #[command(flatten, next_help_heading = "Normals")]
+    normals: NormalsOptions,
+    #[command(flatten, next_help_heading = "Random field, for --method paper")]
+    fit: FitOptions,
 }
 
 impl Model {
@@ -81,6 +81,10 @@ impl Model {
             let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
             context.progress.stage(Some(stage));
         };
+        context.tell_enough(plan.enough_for_model(
+            &cluster_options(measurement, model, &self.cluster, self.seed.seed),
+            context.threads,
+        ));
         // A line may be told only while no bar is drawn.
         let console = console.brief();
         let print = |found: bool, print: &dyn Fn(Console)| {

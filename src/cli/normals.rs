@@ -10,7 +10,7 @@ use super::Console;
 
 #[derive(Args)]
 pub(super) struct NormalsOptions {
-    /// Leave out shadowed and highlighted lights
+    /// Leave out lights that are shadows or highlights at a texel
     #[arg(long)]
     robust: bool,
 }
@@ -20,7 +20,7 @@ pub(super) struct NormalsOptions {
 #[command(after_help = "\
 Examples:
   btf normals wood.zarr wood.model.zarr
-  btf normals wood.zarr wood.model.zarr --robust    leaves out shadowed and highlighted lights")]
+  btf normals wood.zarr wood.model.zarr --robust    for materials with shadows or highlights")]
 pub(super) struct Normals {
     /// The measurement
     measurement: PathBuf,

@@ -13,25 +13,31 @@ const LITTLE: f64 = 0.5;
 
 #[derive(Args)]
 pub(super) struct TileOptions {
-    /// What to take as the tile. auto: as largest, up to 256 texels a side, else as cut; largest: everything if the
-    /// borders join, else the largest seamless part; cut: the part whose seams show least; WIDTHxHEIGHT: a seamless
-    /// part of that size; plane: everything; none: everything, with borders that do not join; periodic: everything,
-    /// with borders that do
-    #[arg(long, default_value = "auto")]
+    /// The part of the measurement that becomes the tile
+    ///
+    /// - auto:         as largest if no side has more than 256 texels, otherwise as cut
+    /// - largest:      everything if its borders join, otherwise the largest seamless part
+    /// - cut:          the part whose seams show least, at most 256 texels a side
+    /// - WIDTHxHEIGHT: a seamless part of that size
+    /// - plane:        everything; whether its borders join is measured
+    /// - none:         everything, with borders that do not join
+    /// - periodic:     everything, with borders that join
+    #[arg(long, default_value = "auto", verbatim_doc_comment)]
     tile: tile::Choice,
-    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    /// Steps from cell to cell of a regular material, in texels: dy,dx;dy,dx (weaves), dy,dx (ribs), none, or auto
+    /// (found in the pictures)
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     pub(super) lattice: LatticeChoice,
 }
 
 #[derive(Args)]
 pub(super) struct Seed {
-    /// Seed of everything random
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
 }
 
-/// Begin a model: choose its tile, the whole measurement or a part whose borders join
+/// Begin a model: choose its tile, which is all of the measurement or a part whose borders join
 #[derive(Args)]
 #[command(after_help = "\
 Examples:

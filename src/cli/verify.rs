@@ -8,6 +8,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -26,25 +27,29 @@ Examples:
   btf verify stores/*.zarr                          one line each, and a count
 The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
-    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); with several, each
-    /// gets one line
+    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); if there are
+    /// several, each gets one line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
-    /// The model of an enlargement [default: where it was when the enlargement was made, or beside it]
+    /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
+    /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// The archive that the measurement was made of; repeat the option for each piece
+    /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print the report as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 impl Verify {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
+        if self.archive.is_empty() {
+            given.refuse_all::<SourceArgs>("without --source: it says how an archive is read", "")?;
+        }
         let [store] = self.stores.as_slice() else {
             if !self.archive.is_empty() {
                 return Err(Error::usage(format!("got --source for {} stores", self.stores.len()))

@@ -1,4 +1,4 @@
-//! The whole method on a made material, and a page that tells the story of the run.
+//! The whole method on a synthetic material, and a page that explains the run with its pictures and figures.
 //!
 //! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
 //! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.
@@ -154,7 +154,10 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
 
     // These are made anew by every run: they read what the stages left and take a few seconds.
     let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
-    let compared = times.time("compare", false, || compare::run(&compare, context))?;
+    let compared = times.time("compare", false, || {
+        let (model, measurement) = compare::open(&compare)?;
+        compare::run(&model, &measurement, context)
+    })?;
     let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
     let figures = Figures::gather(&workshop, compared, places, context)?;
@@ -208,7 +211,7 @@ fn analyse(
     times: &mut Times,
     context: &Context<'_>,
 ) -> Result<()> {
-    let found = |stage: Stage| Model::open(model).and_then(|m| m.stage(stage)).is_ok_and(|s| s.is_some());
+    let found = |stage: Stage| Model::open(model).is_ok_and(|model| model.has(stage).unwrap_or(false));
     let (measurement, model) = (measurement.to_owned(), model.to_owned());
     times.time("tile", found(Stage::Tile), || {
         let (measurement, model) = (measurement.clone(), model.clone());

@@ -10,6 +10,7 @@ use crate::disk::mapped::MappedFile;
 use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
 use crate::run::recipe;
+use crate::run::recipe::Made;
 
 /// A step and the time that it took.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -41,7 +42,7 @@ impl Times {
             Ok(bytes) => {
                 let damaged = |error| Error::input(format!("{}: {error}", path.display()));
                 let found: Value = serde_json::from_slice(bytes.as_ref()).map_err(damaged)?;
-                recipe::expect_same(&path, &found.as_object().cloned().unwrap_or_default(), &recipe)?;
+                Made::of(&found.as_object().cloned().unwrap_or_default()).expect(&path, &recipe)?;
                 serde_json::from_value(found.get("steps").cloned().unwrap_or_default()).map_err(damaged)?
             }
         };

@@ -128,9 +128,14 @@ fn holder(store: &Path, place: &Path, file: &mut File) -> String {
     format!("{}{what}: {whom} has been working on it{since}", store.display())
 }
 
-/// Whether a file is one of these.
+/// What locks are of: stages of a model, and the writing of a store by its recipe.
+const NAMES: [&str; 6] = ["-writing", "-tile", "-cluster", "-normals", "-fit", "-appearance"];
+
+/// Whether a file is one of these, by its whole name.
 pub(crate) fn is_lock(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PREFIX))
+    let name = path.file_name().and_then(|name| name.to_str());
+    let what = name.and_then(|name| name.strip_prefix(PREFIX));
+    what.is_some_and(|what| what.is_empty() || NAMES.contains(&what))
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::image::of_stage;
+use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 
 /// Texels whose colour differences are taken; the other figures count every texel.
@@ -166,13 +167,24 @@ impl Sums {
     }
 }
 
-/// Re-makes the tile under every pair of directions and compares it with the measurement.
-pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
+/// Opens what is compared.
+///
+/// # Errors
+/// Where the model is not of this measurement.
+pub fn open(options: &Options) -> Result<(Model, Measurement)> {
     let model = Model::open(&options.model)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
+    Ok((model, measurement))
+}
+
+/// Re-makes the tile under every pair of directions and compares it with the measurement.
+///
+/// # Errors
+/// Those of reading, and too little memory.
+pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> Result<Report> {
     let description = measurement.description();
-    let (tile, index) = (model.tile()?, of_stage(&model, Stage::Cluster, Model::index)?);
-    let representatives = of_stage(&model, Stage::Cluster, Model::representatives)?;
+    let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
+    let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
     let (texel, channels) = (description.texel_samples(), description.n_channels());
     let decoder = description.decoder()?;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{Direction, Samples};
+use btfkit_formats::Samples;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -10,12 +10,12 @@ use crate::archive::Source;
 use crate::color::{Remarkable, Transfer};
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::run::units::each_at_once;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::store::measurement::gather::Images;
-use crate::store::measurement::{Description, Measurement, Origin};
+use crate::store::measurement::{Description, ImportRecipe, Measurement};
 use crate::words::counted;
 use crate::zarr::codec::Chain;
 
@@ -75,7 +75,7 @@ pub struct Plan<'a> {
     source: &'a dyn Source,
     options: Options,
     description: Description,
-    recipe: Value,
+    recipe: ImportRecipe,
 }
 
 /// How an import went.
@@ -107,26 +107,15 @@ pub fn describe(source: &dyn Source, white: f64) -> Description {
 pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>) -> Result<Plan<'a>> {
     let description = describe(source, options.white);
     description.decoder()?;
-    let degrees = |list: &[Direction]| -> Vec<[f64; 2]> {
-        list.iter().map(|d| d.degrees()).map(|(theta, phi)| [theta, phi]).collect()
-    };
     let contents = source.contents();
-    let recipe = json!({
-        "stage": "import",
-        "method": METHOD,
-        "format": contents.format,
-        "size": [description.size.height, description.size.width],
-        "channels": description.channels,
-        "samples": description.sample_type.name(),
-        "views": degrees(&description.views),
-        "lights": degrees(&description.lights),
-        "images": source.check(context)?,
-        "reading": source.reading(),
-        "transfer": description.transfer,
-        "white": options.white,
-        "codec": options.codec.name(),
-        "assumptions": contents.assumptions,
-    });
+    let recipe = ImportRecipe {
+        format: contents.format.clone(),
+        images: source.check(context)?,
+        reading: serde_json::to_value(source.reading())
+            .map_err(|error| Error::internal(error.to_string()))?,
+        assumptions: contents.assumptions.clone(),
+        ..ImportRecipe::of(&description, options.codec)
+    };
     Ok(Plan { source, options, description, recipe })
 }
 
@@ -145,7 +134,7 @@ impl Plan<'_> {
             "unit": "view",
             "units": self.views().count(),
             "unit_memory_bytes": self.unit_bytes(),
-            "recipe": self.recipe,
+            "recipe": self.recipe.to_value().unwrap_or_default(),
         })
     }
 
@@ -179,12 +168,14 @@ impl Plan<'_> {
             counted(self.description.lights.len(), "light")
         );
         context.require(&unit, self.unit_bytes())?;
-        let contents = self.source.contents();
-        let origin =
-            Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
-        let store = &self.options.store;
-        let measurement =
-            Measurement::create(store, self.description.clone(), self.options.codec, &origin, context)?;
+        let measurement = Measurement::create(
+            &self.options.store,
+            self.description.clone(),
+            self.options.codec,
+            self.recipe.clone(),
+            &self.source.contents().remarks,
+            context,
+        )?;
         let (found, missing): (Vec<usize>, Vec<usize>) =
             self.views().partition(|&view| measurement.has_view(view));
         context.progress.begin("import", self.images(), Counted::Items("images"));

@@ -208,12 +208,15 @@ impl Store {
     /// [`ErrorKind::Missing`] where there is none.
     pub(crate) fn array_document(&self, name: &str) -> Result<Map<String, Value>> {
         let file = self.metadata_path(name);
-        read_object(&file)
-            .map_err(|error| if error.kind() == ErrorKind::Io { error } else { error.hint(MAKE_AGAIN) })?
-            .ok_or_else(|| {
-                Error::missing(format!("{}: no array {name} in this store", self.path().display()))
-                    .hint("run the command that makes this store again; it goes on where it stopped")
-            })
+        let document = read_object(&file)
+            .map_err(|error| if error.kind() == ErrorKind::Io { error } else { error.hint(MAKE_AGAIN) })
+            .and_then(|document| {
+                document.ok_or_else(|| {
+                    Error::missing(format!("{}: no array {name} in this store", self.path().display()))
+                        .hint("run the command that makes this store again; it goes on where it stopped")
+                })
+            });
+        self.unless_made_anew(document)
     }
 
     /// The shape that an array claims, of so many dimensions; nothing else of it is checked.
@@ -235,8 +238,8 @@ impl Store {
     /// # Errors
     /// [`ErrorKind::Missing`] where there is none, [`ErrorKind::Input`] where its metadata are not those of the layout.
     pub fn open_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
-        let document = self.array_document(name)?;
-        self.check_document(name, layout, &document)
+        let document = self.array_document(name);
+        self.unless_made_anew(document.and_then(|document| self.check_document(name, layout, &document)))
     }
 
     /// Checks a document against the layout of an array.

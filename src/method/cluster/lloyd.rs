@@ -14,7 +14,7 @@ use crate::kernel::Kernel;
 use crate::run::Context;
 
 /// When to stop.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Most passes.
     pub passes: usize,

@@ -13,6 +13,7 @@ use crate::disk::output::{expect_outside_stores, holds, put_in_place};
 use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
+use crate::run::recipe::Made;
 use crate::run::{Context, Existing, recipe};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::zarr::storage::MappedStorage;
@@ -82,7 +83,7 @@ impl PyramidFiles {
             _ => error,
         })?;
         if let Some(found) = state {
-            return recipe::expect_same(&self.description, &found, recipe);
+            return Made::of(&found).expect(&self.description, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|entry| temporary::is_temporary(&entry.path()) || is_lock(&entry.path()))
@@ -164,10 +165,7 @@ impl PyramidFiles {
                 _ => {}
             }
         }
-        temporary::remove_folder(&self.folder, |path| {
-            let is_tile = path.extension().is_some_and(|ending| ending == "png" || ending == "jpg");
-            is_tile && path.components().count() == 2 || path == Path::new(STATE)
-        })
+        temporary::remove_folder(&self.folder, |path| is_tile(path) || path == Path::new(STATE))
     }
 
     /// Refuses a page or a description that lies there and is another's, before any work.
@@ -203,4 +201,14 @@ impl PyramidFiles {
         let temporary = written().map_err(|error| Error::io("write", path, error))?;
         put_in_place(temporary.path(), path, existing).map(drop)
     }
+}
+
+/// Whether a file is called as a tile is, `level/column_row.png`, by its way from the folder.
+fn is_tile(path: &Path) -> bool {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let parts: Option<Vec<&str>> = path.iter().map(|part| part.to_str()).collect();
+    let Some([level, file]) = parts.as_deref() else { return false };
+    let stem = file.strip_suffix(".png").or_else(|| file.strip_suffix(".jpg"));
+    let place = stem.and_then(|stem| stem.split_once('_'));
+    is_number(level) && place.is_some_and(|(column, row)| is_number(column) && is_number(row))
 }

@@ -107,7 +107,7 @@ fn tile(enlarged: &Enlarged, path: &Path, named: Option<&Path>, report: &mut Rep
         report.find("attributes", what, "enlarge anew, under another name");
         return Ok(None);
     }
-    let has_normals = enlarged.has_normals() && model.stage(Stage::Normals)?.is_some();
+    let has_normals = enlarged.has_normals() && model.has(Stage::Normals)?;
     let normals = has_normals.then(|| model.normals()).transpose()?;
     let name = model.path().display().to_string();
     report.checked("compared with", name);

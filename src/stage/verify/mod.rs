@@ -83,26 +83,31 @@ pub struct Beside<'a> {
 /// and those of the operating system. What else is damaged is reported.
 pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Found> {
     recognise::expect_readable(path)?;
-    let found = if is_pyramid(path) {
-        Found::Other(deepzoom::verify(path, context)?)
+    let kind = if is_pyramid(path) {
+        None
     } else {
         let kinds = [measured::KIND, modelled::KIND, index::KIND];
         let attributes = Store::at(path).expect_one_of(&kinds)?;
-        match attributes.get("kind").and_then(Value::as_str) {
-            Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
-            Some(index::KIND) => Found::Other(enlarged::run(path, beside.model.as_deref(), context)?),
-            _ => {
-                let measurement = Measurement::open(path)?;
-                let report = Box::new(measurement::run(&measurement, beside.source, context)?);
-                Found::Measurement { views: measurement.description().views.len(), report }
-            }
-        }
+        attributes.get("kind").and_then(Value::as_str).map(str::to_owned)
     };
-    if beside.source.is_some() && !matches!(found, Found::Measurement { .. }) {
-        let what = format!("{}: only a measurement can be compared with an archive", path.display());
-        return Err(Error::usage(what));
+    let kind = kind.as_deref();
+    let refused = |what: &str| Error::usage(format!("{}: {what}", path.display()));
+    if beside.source.is_some() && kind != Some(measured::KIND) {
+        return Err(refused("only a measurement can be compared with an archive"));
     }
-    Ok(found)
+    if beside.model.is_some() && kind != Some(index::KIND) {
+        return Err(refused("only an enlargement is compared with its model").hint("leave out --model"));
+    }
+    Ok(match kind {
+        None => Found::Other(deepzoom::verify(path, context)?),
+        Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
+        Some(index::KIND) => Found::Other(enlarged::run(path, beside.model.as_deref(), context)?),
+        Some(_) => {
+            let measurement = Measurement::open(path)?;
+            let report = Box::new(measurement::run(&measurement, beside.source, context)?);
+            Found::Measurement { views: measurement.description().views.len(), report }
+        }
+    })
 }
 
 /// Whether a path names a pyramid: its description or the folder of its tiles.

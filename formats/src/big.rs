@@ -21,6 +21,7 @@ use chunks::{Chunks, SIGNATURE};
 use layout::Layout;
 
 use crate::utia::{ASSUMPTIONS, Colors, Grid, Order, transfer, with_capacity};
+use crate::words::counted;
 use crate::{Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
 
 /// What the caller knows about a file that the file does not say.
@@ -91,7 +92,7 @@ impl Big {
         if u64::try_from(pairs.len()) != Ok(layout.images) {
             return Err(Error::new(
                 ErrorKind::Argument,
-                format!("{} images", layout.images),
+                counted(layout.images, "image"),
                 format!("{} for the order {:?}", pairs.len(), options.order),
             ));
         }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::words::counted;
 use crate::{Angles, six_digits};
 
 /// Missing pairs that are listed one by one; more are only counted, since a few names can lack millions.
@@ -283,13 +284,15 @@ impl CatalogueErrors {
     fn describe(&self) -> String {
         if self.images == 0 {
             return format!(
-                "found no image among {} names, expected one for every view and light",
-                self.ignored
+                "found no image among {}, expected one for every view and light",
+                counted(self.ignored, "name")
             );
         }
         let mut text = format!(
-            "found {} images of {} views and {} lights, expected one for every pair",
-            self.images, self.views, self.lights
+            "found {} of {} and {}, expected one for every pair",
+            counted(self.images, "image"),
+            counted(self.views, "view"),
+            counted(self.lights, "light")
         );
         let missing = self.missing.iter().map(ToString::to_string);
         push_list(&mut text, "missing", missing, self.missing_count);

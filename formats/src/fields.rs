@@ -176,69 +176,6 @@ impl NumberPrefix {
     }
 }
 
-/// What the angle of a name is in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Unit {
-    Degrees,
-    Radians,
-    /// Gon, turns, milliradians: not read.
-    Other,
-}
-
-impl Unit {
-    /// By what follows a number: right behind it whatever begins like a unit, behind a mark only the whole word.
-    /// Degrees where there is none.
-    pub(crate) fn of(rest: &str) -> Unit {
-        const RADIANS: [&str; 3] = ["radians", "radian", "rads"];
-        const OTHERS: [&str; 9] =
-            ["mrad", "mrads", "grad", "grads", "gradians", "gon", "gons", "turn", "turns"];
-        let word = rest.strip_prefix(['_', '-', ' ']).unwrap_or(rest);
-        let end = word.find(|c: char| !c.is_alphabetic()).unwrap_or(word.len());
-        let word = word.get(..end).unwrap_or_default().to_ascii_lowercase();
-        let glued = end > 0 && rest.starts_with(char::is_alphabetic);
-        let is = |unit: &str| if glued { word.starts_with(unit) } else { word == unit };
-        if is("rad") || RADIANS.iter().any(|unit| is(unit)) {
-            Unit::Radians
-        } else if OTHERS.iter().any(|unit| is(unit)) {
-            Unit::Other
-        } else {
-            Unit::Degrees
-        }
-    }
-}
-
-/// Letters that stand for the decimal point, or before an exponent.
-const LETTERS_IN_NUMBERS: [char; 6] = ['p', 'P', 'd', 'D', 'e', 'E'];
-
-/// Marks after which another number may follow, so that they are no decimal point.
-const BETWEEN_NUMBERS: &str = "_- \t=+()[]{}<>#@~&%/\\";
-
-/// Whether a text that follows a number begins with a mark and more digits, so that the number may have been read by
-/// half: `7,5`, `7p5`, `7d5`, `4.5e+01`, `1.2.3`. Any mark counts that does not stand between numbers (the world has
-/// more decimal points than can be listed), and digits of any script. Minutes behind degrees count too: `7deg30`.
-pub(crate) fn goes_on(rest: &str) -> bool {
-    let digit = |c: char| c.is_numeric();
-    let minutes = ["deg", "°"].iter().find_map(|unit| rest.strip_prefix(unit));
-    if minutes.is_some_and(|minutes| minutes.starts_with(digit)) {
-        return true;
-    }
-    let mut chars = rest.chars();
-    let Some(mark) = chars.next() else { return false };
-    let after = chars.as_str();
-    let after = if "dDeE".contains(mark) { after.strip_prefix(['+', '-']).unwrap_or(after) } else { after };
-    // Digits that are not ASCII: fractions, and other scripts.
-    digit(mark)
-        || (LETTERS_IN_NUMBERS.contains(&mark) || !(mark.is_alphanumeric() || BETWEEN_NUMBERS.contains(mark)))
-            && after.starts_with(digit)
-}
-
-/// The same for names without a pattern, where a dash, an underscore or a blank may stand for the point as well:
-/// digits there belong to no label.
-pub(crate) fn digits_are_left(rest: &str) -> bool {
-    let after = rest.strip_prefix(['_', '-', ' ']);
-    goes_on(rest) || after.is_some_and(|after| after.starts_with(char::is_numeric))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -272,63 +209,6 @@ mod tests {
             let error = Forms::of(&fields(names)).unwrap_err();
             assert!(error.contains(reason), "{names}: {error}");
         }
-    }
-
-    #[test]
-    fn numbers_that_go_on() {
-        for rest in [
-            ",5",
-            "p5",
-            "P5_x",
-            "d5",
-            "D5_",
-            "e+01",
-            "d-1",
-            "E1",
-            ".3",
-            "'5",
-            "·5",
-            "\u{66b}5",
-            "\u{66b}\u{665}",
-            "\u{ff0e}\u{ff15}",
-            "\u{ff0c}5",
-            "\u{2396}5",
-            "\u{2009}5",
-            "\u{2212}5",
-            ";5",
-            ":5",
-            "*5",
-            "`5",
-            "½",
-            "\u{ff15}",
-            "\u{665}",
-        ] {
-            assert!(goes_on(rest) && digits_are_left(rest), "{rest}");
-        }
-        for rest in ["_5", "-5", " 5"] {
-            assert!(!goes_on(rest) && digits_are_left(rest), "{rest}");
-        }
-        for rest in
-            ["", "_pl5", ".png", "pl30", "po5", "ev2", "deg", "d", "p", "--5", "x5", "_", "(2)", "°_5"]
-        {
-            assert!(!digits_are_left(rest), "{rest}");
-        }
-    }
-
-    #[test]
-    fn units_behind_numbers() {
-        for rest in ["rad", "RAD_", "rad.png", "radpl5", "radians", "_rad", " rad_", "-radian.5", "_rads"] {
-            assert_eq!(Unit::of(rest), Unit::Radians, "{rest}");
-        }
-        for rest in ["grad", "Gon_pl5", "_gon", "gradpl", "mrad_", " turns", "_grads"] {
-            assert_eq!(Unit::of(rest), Unit::Other, "{rest}");
-        }
-        for rest in
-            ["", "deg", "°", "_", "_pl5", "pl5", ".png", "_radial", "_gradient", "_gone", "5rad", "_x_rad"]
-        {
-            assert_eq!(Unit::of(rest), Unit::Degrees, "{rest}");
-        }
-        assert!(goes_on("deg30") && goes_on("°30") && !goes_on("deg_30"));
     }
 
     #[test]

@@ -49,6 +49,7 @@
 )]
 
 mod angles;
+mod behind;
 pub mod big;
 pub mod bonn;
 mod catalogue;
@@ -59,6 +60,7 @@ mod error;
 mod fields;
 mod file_name;
 pub mod jpeg;
+mod labels;
 mod limits;
 pub mod mif;
 pub mod mlvq;
@@ -73,6 +75,7 @@ pub mod table;
 pub mod text;
 pub mod ubo2003;
 pub mod utia;
+pub mod words;
 pub mod zip;
 
 pub use angles::Angles;

@@ -23,6 +23,7 @@ pub use zero_bytes::ZeroBytes;
 
 use crate::reader::Reader;
 use crate::ubo2003::{Angles, directions_81};
+use crate::words::counted;
 use crate::{Contents, Direction, Images, Limits, Result, SampleType, Samples, request};
 
 /// Whether the first line is that of a database.
@@ -64,7 +65,7 @@ impl Database {
         let list: Vec<Direction> =
             directions.iter().map(|a| Direction::from_degrees(a.theta_deg(), a.phi_deg())).collect();
         let contents = Contents {
-            format: format!("MLVQ database, {} reflectance functions", header.functions_4d),
+            format: format!("MLVQ database, {}", counted(header.functions_4d, "reflectance function")),
             width: header.width,
             height: header.height,
             channels: ["R", "G", "B"].map(String::from).to_vec(),
@@ -89,11 +90,11 @@ fn assumptions(resolved: Resolved) -> Vec<String> {
     ];
     let Resolved { known, by_rule } = resolved;
     if known > 0 {
-        list.push(format!("{known} ambiguous zero bytes of the tables were read as zero_bytes.txt says."));
+        list.push(format!("Ambiguous zero bytes of the tables, read as zero_bytes.txt says: {known}."));
     }
     if by_rule > 0 {
         list.push(format!(
-            "{by_rule} ambiguous zero bytes of the tables were resolved by continuity: each is its table's minimum or maximum, \
+            "Ambiguous zero bytes of the tables, resolved by continuity: {by_rule}. Each is its table's minimum or maximum, \
              whichever fits its neighbours."
         ));
     }

@@ -9,4 +9,4 @@ mod recognise;
 
 pub use crate::file_name::natural_order;
 pub use pattern::Pattern;
-pub use recognise::recognise;
+pub use recognise::{recognise, unread_behind};

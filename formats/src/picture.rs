@@ -15,6 +15,7 @@
 //! half-transparent pixel is not in the file. Profiles, gamma and primaries are not applied.
 
 mod alpha;
+pub(crate) mod aspect;
 pub mod exr;
 mod foreign;
 mod hdr;
@@ -24,10 +25,12 @@ pub(crate) mod profile;
 mod size;
 mod tiff;
 mod wavelength;
+pub(crate) mod xmp;
 
 pub use foreign::foreign;
 pub use wavelength::wavelength_nm;
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, SampleType, Samples, jpeg};
 
 /// The format of a picture.
@@ -65,7 +68,7 @@ impl Picture {
         let expected =
             u64::try_from(self.channels.len()).map_or(u64::MAX, |channels| pixels.saturating_mul(channels));
         if expected == 0 || u64::try_from(self.samples.len()).ok() != Some(expected) {
-            let found = format!("{} samples", self.samples.len());
+            let found = counted(self.samples.len(), "sample");
             let wanted = format!("{} x {} x {} and not 0", self.height, self.width, self.channels.len());
             return Err(Error::new(ErrorKind::Argument, found, wanted));
         }
@@ -94,7 +97,8 @@ pub struct PictureHeader {
     /// What the picture says of its colours, to stand before "is not applied", where that is not sRGB: the name of an
     /// ICC profile, a gamma, code points, primaries, levels of black and white.
     pub profile: Option<String>,
-    /// What of an OpenEXR picture is read and what is not (layer, channels, window), a sentence each.
+    /// What of the picture is read and what is not (layer, channels, window, crop, pixels that are not square), a
+    /// sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -220,7 +224,7 @@ fn of_jpeg(header: jpeg::Header, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: header.orientation,
         profile: jpeg::profile::profile(bytes),
-        remarks: Vec::new(),
+        remarks: jpeg::profile::remarks(bytes),
     }
 }
 

@@ -1,5 +1,6 @@
 //! A cursor over a byte slice whose every read is checked.
 
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Reads fields one after another, big-endian unless the name says `le`; errors name the byte where the missing field starts.
@@ -30,8 +31,8 @@ impl<'a> Reader<'a> {
         let (Some(taken), Some(end)) = (taken, end) else {
             let left = self.rest().len();
             return Err(Error::malformed(
-                format!("the end of the data after {left} more bytes"),
-                format!("{len} more bytes"),
+                format!("the end of the data after {}", counted(left, "more byte")),
+                format!("{}", counted(len, "more byte")),
             )
             .at(self.position));
         };

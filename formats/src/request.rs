@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::words::counted;
 use crate::{Contents, Error, ErrorKind, Limits, Result};
 
 /// Bytes and contents of a container as they were when it was opened.
@@ -15,7 +16,7 @@ pub(crate) fn check(
     let argument = |found: String, expected: String| Error::new(ErrorKind::Argument, found, expected);
     if bytes.len() != opened_bytes {
         return Err(argument(
-            format!("a file of {} bytes", bytes.len()),
+            format!("a file of {}", counted(bytes.len(), "byte")),
             format!("{opened_bytes}, as when it was opened"),
         ));
     }
@@ -44,13 +45,14 @@ pub(crate) fn samples(contents: &Contents, images: usize, limits: &Limits) -> Re
         _ => Err(Error::new(
             ErrorKind::Limit,
             format!(
-                "{images} images of {} x {} x {} {}",
+                "{} of {} x {} x {} {}",
+                counted(images, "image"),
                 contents.width,
                 contents.height,
                 contents.channels.len(),
                 contents.sample_type.name()
             ),
-            format!("at most {} bytes in one call (max_decoded_bytes)", limits.max_decoded_bytes),
+            format!("at most {} in one call (max_decoded_bytes)", counted(limits.max_decoded_bytes, "byte")),
         )),
     }
 }
@@ -59,7 +61,7 @@ pub(crate) fn samples(contents: &Contents, images: usize, limits: &Limits) -> Re
 pub(crate) fn plane(width: u64, height: u64, channels: u64, limits: &Limits) -> Result<(u32, u32)> {
     if width == 0 || height == 0 || channels == 0 {
         return Err(Error::malformed(
-            format!("images of {width} x {height} pixels, {channels} channels"),
+            format!("images of {width} x {height} pixels, {}", counted(channels, "channel")),
             "at least 1 x 1, 1",
         ));
     }
@@ -67,13 +69,13 @@ pub(crate) fn plane(width: u64, height: u64, channels: u64, limits: &Limits) -> 
         return Err(Error::new(
             ErrorKind::Limit,
             format!("images of {width} x {height} pixels"),
-            format!("at most {} pixels (max_pixels_per_image)", limits.max_pixels_per_image),
+            format!("at most {} (max_pixels_per_image)", counted(limits.max_pixels_per_image, "pixel")),
         ));
     }
     if channels > limits.max_channels {
         return Err(Error::new(
             ErrorKind::Limit,
-            format!("{channels} channels"),
+            counted(channels, "channel"),
             format!("at most {} (max_channels)", limits.max_channels),
         ));
     }

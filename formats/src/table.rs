@@ -3,7 +3,8 @@
 //! CSV with a header line. Columns, in any order and case: `file`; `theta_i`, `phi_i` of the light;
 //! `theta_v`, `phi_v` of the view, all in degrees. A direction may be a vector `x_i`, `y_i`, `z_i` (`x_v`
 //! ...) of any length instead. Without columns of the view all pictures have the frontal one. Other columns
-//! are ignored, so are lines that start with `#` and empty ones. Columns are separated by comma, semicolon or
+//! are ignored, but for those whose names are of directions (`theta_o`, `Theta (deg)`), which are refused; so are lines that
+//! start with `#` and empty ones. Columns are separated by comma, semicolon or
 //! tab; numbers have a decimal point; the text is UTF-8, or UTF-16 with a byte order mark. Frame as everywhere: x right, y up, z out of the surface, phi
 //! counter-clockwise from +x.
 //!
@@ -13,6 +14,7 @@
 use crate::fields::{Field, Forms};
 use crate::file_name::{inside_folder, parts_of, repeated};
 use crate::text::utf8;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Pair, Result};
 
 /// The rows of a table, in its order.
@@ -63,7 +65,7 @@ pub fn read(bytes: &[u8], limits: &Limits) -> Result<Table> {
     for record in reader.byte_records() {
         let record = record.map_err(|error| translate(&error, bytes))?;
         if u64::try_from(rows.len()).unwrap_or(u64::MAX) >= limits.max_entries {
-            let found = format!("more than {} rows", limits.max_entries);
+            let found = format!("more than {}", counted(limits.max_entries, "row"));
             return Err(Error::new(ErrorKind::Limit, found, "a table within the limit of entries"));
         }
         rows.push(columns.row(&record, bytes)?);
@@ -96,9 +98,10 @@ fn open(bytes: &[u8]) -> Result<(csv::Reader<&[u8]>, Columns)> {
             Ok(columns) => return Ok((reader, columns)),
             Err(found) => {
                 if best.as_ref().is_none_or(|(most, _)| split > *most) {
-                    let found = format!("a header line of {split} columns between {name}, {found}");
-                    let expected =
-                        "columns file, theta_i, phi_i (or x_i, y_i, z_i), and theta_v, phi_v if views vary";
+                    let found =
+                        format!("a header line of {} between {name}, {found}", counted(split, "column"));
+                    let expected = "columns file, theta_i, phi_i (or x_i, y_i, z_i), and theta_v, phi_v if views vary, \
+                                    all angles in degrees; rename the columns, or take others out";
                     best = Some((split, Error::malformed(found, expected)));
                 }
             }
@@ -118,6 +121,10 @@ impl Columns {
             (None, _) => return Err("none of them file".to_owned()),
             _ => return Err("file twice".to_owned()),
         };
+        let unread = |name: &&String| Field::named(name).is_none() && looks_like_direction(name);
+        if let Some(name) = names.iter().find(unread) {
+            return Err(format!("of which {name:?} is named as a direction is, but not as one that is read"));
+        }
         let fields: Vec<(Field, usize)> =
             names.iter().zip(0..).filter_map(|(name, column)| Some((Field::named(name)?, column))).collect();
         let given: Vec<Field> = fields.iter().map(|&(field, _)| field).collect();
@@ -159,12 +166,52 @@ impl Columns {
     }
 }
 
+/// Whether a column's name is one that a direction may have: `theta_o`, `thetav`, `view_theta`, `Azimuth (rad)`, `lx`.
+fn looks_like_direction(name: &str) -> bool {
+    const WORDS: [&str; 20] = [
+        "theta",
+        "azim",
+        "zenith",
+        "polar",
+        "elev",
+        "altitude",
+        "inclin",
+        "inciden",
+        "angle",
+        "tilt",
+        "slant",
+        "colatitude",
+        "direction",
+        "radian",
+        "degree",
+        "\u{3b8}",
+        "\u{3d1}",
+        "\u{3c6}",
+        "\u{3d5}",
+        "\u{b0}",
+    ];
+    // Which may be parts of other words, as in `graphic`.
+    const COMPONENTS: [&str; 7] = ["phi", "t", "p", "th", "x", "y", "z"];
+    const SIDES: [&str; 10] = ["i", "o", "l", "v", "light", "view", "in", "out", "r", "e"];
+    let name = name.to_lowercase();
+    let letters: String = name.chars().filter(|c| c.is_alphanumeric() || *c == '\u{b0}').collect();
+    let of_side = |(component, side): (&str, &str)| {
+        letters == format!("{component}{side}") || letters == format!("{side}{component}")
+    };
+    let parts =
+        || COMPONENTS.into_iter().flat_map(|component| SIDES.into_iter().map(move |side| (component, side)));
+    let unit = ["deg", "degs", "rad", "rads", "gon", "grad"];
+    let is_word = |word: &str| word == "phi" || unit.contains(&word);
+    let has_word = || name.split(|c: char| !c.is_alphabetic()).any(is_word);
+    WORDS.iter().any(|word| letters.contains(word)) || parts().any(of_side) || has_word()
+}
+
 fn translate(error: &csv::Error, bytes: &[u8]) -> Error {
     match error.kind() {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
             let (line, byte) = start(pos.as_ref(), bytes);
-            let expected = format!("{expected_len} columns as in the header");
-            Error::malformed(format!("line {line}: {len} columns"), expected).at(byte)
+            let expected = format!("{} as in the header", counted(*expected_len, "column"));
+            Error::malformed(format!("line {line}: {}", counted(*len, "column")), expected).at(byte)
         }
         _ => Error::malformed(error.to_string(), "a table of comma-separated values"),
     }
@@ -230,6 +277,43 @@ mod tests {
         assert!(!table.has_view);
         assert_eq!(table.rows[0].pair, pair([45.0, 270.0, 0.0, 0.0]));
         assert_eq!(table.rows[1].pair, pair([0.0; 4]));
+    }
+
+    #[test]
+    fn columns_that_look_like_directions_are_read_or_refused() {
+        for name in [
+            "theta_o",
+            "thetav",
+            "theta-v",
+            "view_theta",
+            "Theta (deg)",
+            "theta_v_deg",
+            "PHI",
+            "Azimuth",
+            "lx",
+            "x_light",
+            "tv",
+            "elevation",
+            "angle of the lamp",
+            "zenith [rad]",
+            "tilt",
+            "\u{3b8}_v",
+            "rotation_deg",
+            "theta_h",
+        ] {
+            let error = table(&format!("file,theta_i,phi_i,{name}\na.png,1,2,3\n")).unwrap_err().to_string();
+            for words in [&format!("{name:?}")[..], "named as a direction", "theta_v", "degrees", "rename"] {
+                assert!(error.contains(words), "{name}: {error}");
+            }
+        }
+        let alone = table("file;Theta (deg);Phi (deg)\na;1;2\n").unwrap_err().to_string();
+        assert!(alone.contains("between semicolons") && alone.contains("Theta (deg)"), "{alone}");
+        for name in [
+            "exposure", "date", "light", "view", "iso", "grade", "n", "comment", "camera", "lamp", "width",
+            "photo", "graphic",
+        ] {
+            assert!(table(&format!("file,theta_i,phi_i,{name}\na.png,1,2,3\n")).is_ok(), "{name}");
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
 use super::{Options, list_of_bounded_size, read_beside};
 use crate::error::{Error, ErrorKind, Result};
+use crate::words::counted;
 
 /// A complete set of images, how it was found, and what had to be assumed.
 pub(super) struct Found {
@@ -65,9 +66,9 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
     if !lists.is_empty() {
         return by_light_lists(files, &lists, limits, complete);
     }
-    if let Some(name) = files.names().find(|name| ubo2003::half_read(name)) {
-        let found = format!("{name}: digits that belong to no label are left over behind an angle");
-        return Err(Error::input(found).context(archive.display()).hint(for_digits_left(name)));
+    for name in files.names() {
+        let unread = |error| Error::from(error).context(archive.display()).hint(for_unread_angles(name));
+        ubo2003::expect_known(name).map_err(unread)?;
     }
     let pairs: Vec<Option<Pair>> = files.names().map(of_ubo2003_name).collect();
     if pairs.iter().any(Option::is_some) {
@@ -81,20 +82,20 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         if let Some(foreign) = files.foreign() {
             return Error::input(foreign).context(archive.display());
         }
-        let counted = files.names().find(|name| without_counter(name).is_some());
-        Error::from(error).context(archive.display()).hint(counted.map_or(NAMES.to_owned(), for_digits_left))
+        let unread = files.names().find(|name| named::unread_behind(name).is_some());
+        Error::from(error).context(archive.display()).hint(unread.map_or(NAMES.to_owned(), for_unread_angles))
     })?;
     by_pattern(&pattern, files, complete)
 }
 
-/// What to do about a name with digits behind an angle, which may be a fraction or a counter.
-fn for_digits_left(name: &str) -> String {
-    let counter = match without_counter(name) {
+/// What to do about a name with something behind an angle that is not known; digits may be a fraction or a counter.
+fn for_unread_angles(name: &str) -> String {
+    let pattern = match without_counter(name) {
         Some(pattern) => format!("if the last digits only count: --pattern '{pattern}'"),
-        None => "--pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}' says what digits do not matter"
+        None => "say by --pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}' where the angles stand"
             .to_owned(),
     };
-    format!("angles have a decimal point (tl7.5); {counter}; --table FILE.csv lists the angles")
+    format!("rename the pictures; or {pattern}; or list the angles by --table FILE.csv")
 }
 
 /// The pattern of a name that ends in a counter, if there is one when that is left out.
@@ -227,7 +228,8 @@ fn match_files(
         }
     }
     let remark = example.map(|example| {
-        format!("{different} names in {} are not quite those of the pictures: {example}", list.display())
+        let names = counted(different, "name");
+        format!("{names} in {} not quite as the pictures have it: {example}", list.display())
     });
     Ok((pairs, remark))
 }
@@ -239,9 +241,9 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
     pictures.sort_by(|&a, &b| natural_order(files.name(a), files.name(b)));
     if pictures.len() != lights.len() {
         return Err(Error::input(format!(
-            "{list}: got {} lights without names and {} pictures, expected as many",
-            lights.len(),
-            pictures.len()
+            "{list}: got {} without names and {}, expected as many",
+            counted(lights.len(), "light"),
+            counted(pictures.len(), "picture")
         )));
     }
     let neighbours = || pictures.iter().zip(pictures.iter().skip(1));

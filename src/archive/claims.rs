@@ -14,7 +14,15 @@ const RIGHT_ANGLE_RAD: f64 = 1.58;
 /// Names of a channel that says how opaque a texel is.
 const ALPHA: [&str; 8] = ["a", "alpha", "ra", "ga", "ba", "ar", "ag", "ab"];
 
-/// Refuses channels that are one by two names (`550nm` and `550.0`, `R` and `r`), and opacity among colours.
+/// Names of a single channel that is no light.
+const NO_LIGHT: [&str; 12] =
+    ["z", "zback", "depth", "a", "alpha", "mask", "id", "n", "u", "v", "normal", "velocity"];
+
+/// Names of a single channel that is grey without a doubt, beside wavelengths and numbers.
+const GREY: [&str; 9] = ["y", "l", "i", "grey", "gray", "luminance", "intensity", "reflectance", "albedo"];
+
+/// Refuses channels that are one by two names (`550nm` and `550.0`, `R` and `r`), opacity among colours, and a single
+/// channel that is no light.
 ///
 /// # Errors
 /// Names the channels.
@@ -33,6 +41,14 @@ pub(super) fn require_channels(contents: &Contents) -> Result<()> {
     let colours = ["R", "G", "B"].iter().all(|colour| names.iter().any(|name| is(name, colour)));
     let grey = names.len() == 2 && names.iter().any(|name| is(name, "Y"));
     let alpha = names.iter().find(|name| ALPHA.iter().any(|alpha| is(name, alpha)));
+    if let [only] = names.as_slice()
+        && NO_LIGHT.iter().any(|name| is(only, name))
+    {
+        return Err(Error::input(format!(
+            "got the channel {only} alone, expected light: {only} is the name of a depth, an opacity, a normal or the like"
+        ))
+        .hint("take the pictures with their colours; or, if it is light, rename the channel to Y"));
+    }
     match alpha {
         Some(alpha) if colours || grey => Err(Error::input(format!(
             "got the channels {}, expected reflectances only: {alpha} says how opaque a texel is",
@@ -41,6 +57,16 @@ pub(super) fn require_channels(contents: &Contents) -> Result<()> {
         .hint("leave that channel out of the archive")),
         _ => Ok(()),
     }
+}
+
+/// What to know of a single channel that may be one of several: all that is made of it is grey.
+pub(super) fn single_channel(contents: &Contents) -> Option<String> {
+    let [only] = contents.channels.as_slice() else { return None };
+    let name = only.trim().to_lowercase();
+    // Arrays and pictures without names have numbers.
+    let numbered = name.trim_start_matches(|c: char| c.is_alphabetic() || c == ' ').parse::<u32>().is_ok();
+    let known = GREY.contains(&name.as_str()) || wavelength_nm(only).is_some() || numbered;
+    (!known).then(|| format!("the only channel is called {only:?}: it is taken as grey, for all colours"))
 }
 
 /// What a name says, the same for all spellings.
@@ -75,9 +101,12 @@ pub(super) fn doubtful_angles(contents: &Contents) -> Vec<String> {
     let highest = views.max(lights);
     let mut notes = Vec::new();
     if highest > 0.0 && highest <= RIGHT_ANGLE_RAD {
+        let way_out = match contents.format.as_str() {
+            names if names.starts_with("pictures named") => "say so by --pattern ({theta_i:rad} and so on)",
+            _ => "multiply them by 180 / pi",
+        };
         notes.push(format!(
-            "no direction is more than {highest:.3} degrees from the normal: if the angles are radians, say so by --pattern \
-             ({{theta_i:rad}} and so on)"
+            "no direction is more than {highest:.3} degrees from the normal: if the angles are radians, {way_out}"
         ));
     }
     for (what, highest) in [("view", views), ("light", lights)] {

@@ -33,6 +33,19 @@ pub(super) struct Recognised {
     pub(super) uses: &'static [&'static str],
 }
 
+/// What a container is by its first bytes, with its article; `None` if it is none.
+pub fn name_of(head: &[u8]) -> Option<&'static str> {
+    match head {
+        _ if bonn::recognise(head).is_some() => Some("a Bonn BTF archive"),
+        _ if mlvq::recognise(head) => Some("an MLVQ database"),
+        _ if big::recognise(head) => Some("a UTIA BIG archive"),
+        _ if mif::recognise(head) => Some("a MIF archive"),
+        _ if head.starts_with(NPY_MAGIC) => Some("a numpy array"),
+        _ if crate::archive::hdf5::recognise(head) => Some("an HDF5 file"),
+        _ => None,
+    }
+}
+
 /// Opens a file that is a container by its first bytes; `None` if it is none.
 pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
     let head = files::read_head(path, HEAD_BYTES)?;

@@ -310,7 +310,7 @@ pub(super) fn read_head(path: &Path, most: u64) -> Result<Vec<u8>> {
 
 /// Files below a folder, sorted by path, and how many hidden ones were left out. Links to files are followed, links to
 /// folders are not.
-fn list_folder(root: &Path) -> Result<(Vec<PathBuf>, usize)> {
+pub(super) fn list_folder(root: &Path) -> Result<(Vec<PathBuf>, usize)> {
     let mut hidden = 0;
     let mut files = Vec::new();
     let mut folders = vec![(root.to_owned(), 0)];

@@ -9,6 +9,7 @@ mod claims;
 mod container;
 mod files;
 pub mod hdf5;
+mod instead;
 mod matching;
 mod pictures;
 
@@ -21,6 +22,8 @@ use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+
+pub use container::name_of;
 
 use crate::color::Remarkable;
 use crate::error::{Error, Result};
@@ -179,7 +182,11 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
             reading.adaptation.samples = reading.adaptation.samples.or(recognised.samples);
             recognised.source
         }
-        None => Box::new(pictures::Pictures::open(paths, options, limits)?),
+        None => {
+            instead::expect_no_store(paths)?;
+            let opened = pictures::Pictures::open(paths, options, limits);
+            Box::new(opened.map_err(|error| instead::of_containers(paths).unwrap_or(error))?)
+        }
     };
     options.expect_used(uses, source.as_ref())?;
     claims::require_channels(source.contents()).map_err(|error| error.context(source.path().display()))?;
@@ -190,7 +197,7 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
 pub fn notes(source: &dyn Source) -> Vec<String> {
     let contents = source.contents();
     let doubts = claims::near_directions(contents).into_iter().chain(claims::doubtful_angles(contents));
-    source.notes().into_iter().chain(doubts).collect()
+    source.notes().into_iter().chain(claims::single_channel(contents)).chain(doubts).collect()
 }
 
 /// The bytes of a small file beside an archive: a list, a table.

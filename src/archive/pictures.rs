@@ -13,6 +13,7 @@ use super::{Options, Source};
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::units::each_at_once;
 use crate::run::{Context, recipe};
+use crate::words::counted;
 
 /// Problems that an error names one by one.
 const NAMED_PROBLEMS: usize = 20;
@@ -262,7 +263,7 @@ impl Source for Pictures {
 fn notes_of(files: &Files, images: &[usize], ignored: usize) -> Vec<String> {
     let mut left = vec![true; files.len()];
     images.iter().for_each(|&number| left[number] = false);
-    let count = (ignored > 0).then(|| format!("{ignored} other files are ignored"));
+    let count = (ignored > 0).then(|| format!("{} ignored", counted(ignored, "other file")));
     count.into_iter().chain(catalogue::left_out(files, left.into_iter())).collect()
 }
 
@@ -271,7 +272,7 @@ pub(super) fn fail_on(archive: &Path, problems: &[String]) -> Result<()> {
     if problems.is_empty() {
         return Ok(());
     }
-    let mut lines = vec![format!("{}: {} unusable images", archive.display(), problems.len())];
+    let mut lines = vec![format!("{}: {}", archive.display(), counted(problems.len(), "unusable image"))];
     lines.extend(problems.iter().take(NAMED_PROBLEMS).map(|problem| format!("  {problem}")));
     if problems.len() > NAMED_PROBLEMS {
         lines.push(format!("  and {} more", problems.len() - NAMED_PROBLEMS));

@@ -72,6 +72,17 @@ impl Import {
     fn jobs(&self) -> Result<Vec<Job>> {
         let is_store =
             |path: &Path| path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists();
+        if let ([store, .., archive], None) = (self.paths.as_slice(), &self.into)
+            && is_store(store)
+            && !is_store(archive)
+        {
+            return Err(Error::usage(format!(
+                "got the store {} before {}, expected the archive first and the store last",
+                store.display(),
+                archive.display()
+            ))
+            .hint(format!("btf import {} {}", archive.display(), store.display())));
+        }
         let folder = self.into.clone().unwrap_or_default();
         // Misspelt, the last of many archives is not to become a store.
         let is_new = |path: &Path| {

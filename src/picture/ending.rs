@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::run::budget::Allowance;
 use crate::shape::Size;
+use crate::words::counted;
 
 /// Formats of pictures, by the endings of their names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -158,14 +159,16 @@ impl Encoding {
         let most = self.ending.most_side();
         if size.width.max(size.height) > most {
             return Err(Error::usage(format!(
-                "a picture of {size}: a {name} has at most {most} pixels a side"
+                "a picture of {size}: a {name} has at most {} a side",
+                counted(most, "pixel")
             ))
             .hint("show a part with --window, or write .png or .exr"));
         }
         let bytes = self.raw_bytes(size);
         if self.ending == Ending::Tiff && bytes > TIFF_BYTES {
             return Err(Error::usage(format!(
-                "a picture of {size} has {bytes} bytes of pixels: a TIFF holds at most {TIFF_BYTES}"
+                "a picture of {size} has {} of pixels: a TIFF holds at most {TIFF_BYTES}",
+                counted(bytes, "byte")
             ))
             .hint("show a part with --window, or write .png or .exr"));
         }

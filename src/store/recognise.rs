@@ -4,10 +4,10 @@
 use std::io::Read;
 use std::path::Path;
 
-use btfkit_formats::{big, bonn, mif, mlvq};
 use serde_json::{Value, json};
 
 use super::{enlarged, measurement, model};
+use crate::archive::name_of;
 use crate::disk::lock::is_lock;
 use crate::disk::mapped::{open, special};
 use crate::disk::temporary::is_temporary;
@@ -101,16 +101,8 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
 
 fn of_file(head: &[u8]) -> Other {
     let starts = |magic: &[u8]| head.starts_with(magic);
-    let known = match head {
-        _ if starts(b"PK\x03\x04") || starts(b"PK\x05\x06") => Some("a zip archive"),
-        _ if bonn::recognise(head).is_some() => Some("a Bonn BTF archive"),
-        _ if mlvq::recognise(head) => Some("an MLVQ database"),
-        _ if big::recognise(head) => Some("a UTIA BIG archive"),
-        _ if mif::recognise(head) => Some("a MIF archive"),
-        _ if starts(b"\x93NUMPY") => Some("a numpy array"),
-        _ if starts(b"\x89HDF\r\n\x1a\n") => Some("an HDF5 file"),
-        _ => None,
-    };
+    let zip = (starts(b"PK\x03\x04") || starts(b"PK\x05\x06")).then_some("a zip archive");
+    let known = zip.or_else(|| name_of(head));
     if let Some(what) = known {
         return Other { what: format!("an archive ({what})"), use_it: Use::Import };
     }

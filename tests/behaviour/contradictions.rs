@@ -51,7 +51,7 @@ fn a_line_of_a_list_that_leads_nowhere_is_named() {
     for (count, lights) in [("4", 3), ("2", 3)] {
         fs::write(root.join("l.lp"), list(["a.png", "b.png", "c.png"]).replacen('3', count, 1)).unwrap();
         let error = refused(&root);
-        let words = format!("line 1 says that there are {count} lights, up to line 4 there are {lights}");
+        let words = format!("line 1 gives {count} as the number of lights, up to line 4 there are {lights}");
         assert!(error.contains(&words), "{error}");
     }
     fs::write(root.join("l.lp"), list(["\"a.png\"", "b.png", "c.png"]) + "\x1A").unwrap();
@@ -65,7 +65,7 @@ fn pictures_that_are_left_out_are_named() {
     files.push(("notes.txt", Vec::new()));
     let (_folder, root) = set(&files);
     let found = told(&root);
-    assert!(found.contains("2 other files are ignored"), "{found}");
+    assert!(found.contains("2 other files ignored"), "{found}");
     assert!(
         found.contains("pictures without directions are left out:") && found.contains("tl95 pl0"),
         "{found}"

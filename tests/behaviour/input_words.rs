@@ -54,7 +54,7 @@ fn radians_are_read_where_they_are_said_and_doubted_by_every_command_where_not()
     assert!(told(&root).contains("tl{theta_i:rad}rad_pl{phi_i:rad}rad"));
     let (_folder, root) =
         set(&three(["tl0.5gon_pl0gon.png", "tl0.5gon_pl100gon.png", "tl0.5gon_pl200gon.png"]));
-    assert!(refused(&root).contains("another unit"));
+    assert!(refused(&root).contains("\"gon\" behind the angle 0.5"));
 
     let (_folder, bare) = set(&three(["tl0.5_pl0.png", "tl0.5_pl1.57.png", "tl0.5_pl3.14.png"]));
     // Pictures of one value are a fault of their own.
@@ -149,4 +149,70 @@ fn options_that_an_archive_has_no_use_for_are_refused() {
         assert!(told.contains("changes nothing") && told.contains(whose), "{archive} {options:?}: {told}");
         assert!(!at("a.zarr").exists());
     }
+}
+
+#[test]
+fn a_folder_of_a_container_and_a_file_beside_it_say_what_to_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let inner = folder.path().join("set").join("material");
+    std::fs::create_dir_all(&inner).unwrap();
+    let (bonn, array, list) = (inner.join("m.btf"), inner.join("m.npy"), inner.join("notes.txt"));
+    succeed(btf().arg("export").arg(fixture().measurement()).arg(&bonn));
+    std::fs::write(&list, "notes").unwrap();
+    for named in [&inner, &inner.parent().unwrap().to_owned(), &list] {
+        let said = fail(btf().arg("info").arg(named), 65);
+        assert!(said.contains("no pictures") && said.contains("m.btf (a Bonn BTF archive)"), "{said}");
+        assert!(said.contains(&format!("name the file: {}", bonn.display())), "{said}");
+    }
+    succeed(btf().arg("export").arg(fixture().measurement()).arg(&array));
+    let said = fail(btf().arg("info").arg(&inner), 65);
+    assert!(said.contains("m.npy (a numpy array)") && !said.contains("m.views.npy"), "{said}");
+    // Pictures have faults of their own.
+    std::fs::write(inner.join("a.png"), png(9)).unwrap();
+    assert!(!refused(&inner).contains("name the file"));
+}
+
+#[test]
+fn a_store_in_the_place_of_an_archive_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let (store, archive) = (fixture().measurement(), folder.path().join("m.btf"));
+    succeed(btf().arg("export").arg(&store).arg(&archive));
+    let before = std::fs::read(store.join("zarr.json")).unwrap();
+    for (named, code, words) in [
+        (vec![store.clone(), archive.clone()], 2, "expected the archive first and the store last"),
+        (
+            vec![folder.path().join("new.zarr"), archive.clone()],
+            2,
+            "expected the archive first and the store last",
+        ),
+        (vec![store.clone(), folder.path().join("new.zarr")], 65, "got a store, expected an archive"),
+        (vec![store.clone()], 65, "got a store, expected an archive"),
+    ] {
+        let said = fail(btf().arg("import").args(&named), code);
+        assert!(said.contains(words), "{named:?}: {said}");
+    }
+    assert_eq!(std::fs::read(store.join("zarr.json")).unwrap(), before);
+}
+
+#[test]
+fn a_single_channel_that_is_no_grey_is_told_or_refused() {
+    let of =
+        |name: &str| set(&[("tl20_pl0.exr", of_channels(&[name])), ("tl20_pl90.exr", of_channels(&[name]))]);
+    for (name, grey) in [("R", false), ("layer.B", false), ("foo", false), ("Y", true), ("550nm", true)] {
+        let (_folder, root) = of(name);
+        assert_eq!(told(&root).contains("it is taken as grey"), !grey, "{name}");
+    }
+    for name in ["Z", "layer.Depth.Z", "mask", "N"] {
+        let (_folder, root) = of(name);
+        assert!(refused(&root).contains("expected light"), "{name}");
+    }
+}
+
+#[test]
+fn advice_on_radians_is_for_the_kind_of_archive() {
+    let (folder, root) = set(&three(["a.png", "b.png", "c.png"]));
+    let table = folder.path().join("t.csv");
+    std::fs::write(&table, "file,theta_i,phi_i\na.png,0.5,0\nb.png,0.5,1.57\nc.png,0.5,3.14\n").unwrap();
+    let said = succeed(btf().arg("info").arg(&root).arg("--table").arg(&table));
+    assert!(said.contains("multiply them by 180 / pi") && !said.contains("--pattern"), "{said}");
 }

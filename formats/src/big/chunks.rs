@@ -1,6 +1,7 @@
 //! The walk over the chunks of a file.
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// The first eight bytes.
@@ -45,7 +46,7 @@ impl Chunk<'_> {
     }
 
     pub(super) fn wrong_size(&self, expected: &'static str) -> Error {
-        let found = format!("a chunk {} of {} bytes", self.id, self.data.len());
+        let found = format!("a chunk {} of {}", self.id, counted(self.data.len(), "byte"));
         Error::malformed(found, expected).at(self.at)
     }
 }
@@ -72,10 +73,14 @@ impl<'a> Chunks<'a> {
             let size = usize::try_from(length).ok().filter(|&size| size <= left);
             let Some(size) = size else {
                 let expected = format!("at most the {left} that are left");
-                return Err(Error::malformed(format!("a chunk {id} of {length} bytes"), expected).at(at));
+                return Err(Error::malformed(
+                    format!("a chunk {id} of {}", counted(length, "byte")),
+                    expected,
+                )
+                .at(at));
             };
             if length.checked_rem(ALIGNMENT) != Some(0) {
-                let found = format!("a chunk {id} of {length} bytes");
+                let found = format!("a chunk {id} of {}", counted(length, "byte"));
                 return Err(Error::malformed(found, "a multiple of 8").at(at));
             }
             let data_at = reader.position();

@@ -4,6 +4,7 @@ use super::chunks::{Chunk, Chunks};
 use super::directions::{self, Directions};
 use super::layout::{Axis, DEFAULT_ORDER, Entity, Layout};
 use crate::utia::Number;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, request};
 
 const IMAGES: u64 = 1;
@@ -47,7 +48,7 @@ pub(super) fn describe(chunks: &Chunks<'_>, limits: &Limits) -> Result<Described
     };
     request::plane(layout.width, layout.height, layout.planes, limits)?;
     if layout.images == 0 || layout.tiles == 0 {
-        let found = format!("{} images of {} tiles", layout.images, layout.tiles);
+        let found = format!("{} of {}", counted(layout.images, "image"), counted(layout.tiles, "tile"));
         return Err(Error::malformed(found, "at least one of each"));
     }
     let Some(data) = chunks.one(DATA)? else {
@@ -88,7 +89,7 @@ fn order(chunk: &Chunk<'_>) -> Result<[Axis; 5]> {
     let axes: Option<[Axis; 5]> = axes.and_then(|list| list.try_into().ok());
     let complete = |axes: &[Axis; 5]| DEFAULT_ORDER.iter().all(|axis| axes.contains(axis));
     axes.filter(complete).ok_or_else(|| {
-        let found = format!("a data order of other numbers, {} bytes", chunk.data.len());
+        let found = format!("a data order of other numbers, {}", counted(chunk.data.len(), "byte"));
         Error::malformed(found, "each of 1, 2, 3, 4, 5 once").at(chunk.at)
     })
 }
@@ -100,13 +101,13 @@ fn entities(layout: &Layout, data: &Chunk<'_>, types: Option<&Chunk<'_>>) -> Res
     let too_large = || {
         Error::malformed(
             format!(
-                "{} images x {} tiles x {} rows x {} columns x {} planes in {} bytes of data",
-                layout.images,
+                "{} x {} tiles x {} rows x {} columns x {} planes in {} of data",
+                counted(layout.images, "image"),
                 layout.tiles,
                 layout.height,
                 layout.width,
                 layout.planes,
-                data.data.len()
+                counted(data.data.len(), "byte")
             ),
             "as many samples as there are bytes for",
         )
@@ -129,7 +130,9 @@ fn entities(layout: &Layout, data: &Chunk<'_>, types: Option<&Chunk<'_>>) -> Res
     let size = at.saturating_sub(data.data_at);
     if size.checked_next_multiple_of(8) != Some(data.data.len()) {
         let expected = format!("{size}, as the dimensions say, and less than 8 of padding");
-        return Err(Error::malformed(format!("{} bytes of data", data.data.len()), expected).at(data.at));
+        return Err(
+            Error::malformed(format!("{} of data", counted(data.data.len(), "byte")), expected).at(data.at)
+        );
     }
     Ok(entities)
 }
@@ -149,8 +152,8 @@ fn numbers(count: usize, types: Option<&Chunk<'_>>) -> Result<Vec<Number>> {
         (Some(0), rest) if rest == count => ids.map(number).collect(),
         (Some(id), 0) if id != 0 => Ok(vec![number(id)?; count]),
         (Some(0), rest) => {
-            let expected = format!("one for each of {count} outermost entities");
-            Err(Error::malformed(format!("{rest} data types after a 0"), expected).at(chunk.at))
+            let expected = format!("one for each of {}", counted(count, "outermost entity"));
+            Err(Error::malformed(format!("{} after a 0", counted(rest, "data type")), expected).at(chunk.at))
         }
         _ => Err(chunk.wrong_size("one data type, or 0 and one for each outermost entity")),
     }

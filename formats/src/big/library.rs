@@ -5,6 +5,7 @@ use super::document::Described;
 use super::layout::{DEFAULT_ORDER, Entity, Layout};
 use crate::reader::Reader;
 use crate::utia::Number;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, request};
 
 const IMAGES: u64 = 1;
@@ -38,7 +39,7 @@ pub(super) fn describe(chunks: &Chunks<'_>, limits: &Limits) -> Result<Described
     if u64::try_from(count) != Ok(layout.images) || count == 0 {
         // Older states of the library had other ids, and wrote files that it cannot read itself.
         let expected = format!("{}, as chunk 1 says, and at least one", layout.images);
-        return Err(Error::malformed(format!("{count} chunks 6 of image data"), expected));
+        return Err(Error::malformed(format!("{} 6 of image data", counted(count, "chunk")), expected));
     }
     let samples = layout.entity_samples().and_then(|samples| usize::try_from(samples).ok());
     let mut entities = vec![None; count];

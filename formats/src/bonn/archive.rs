@@ -8,6 +8,7 @@ use super::header::{Header, read_rotations};
 use super::images::{self, Plane};
 use super::signature::{BonnKind, Signature, readings};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Contents, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
 /// Which row of the image is stored first.
@@ -70,7 +71,7 @@ impl Archive {
         };
         let left = reader.rest().len();
         if left > 0 {
-            let found = format!("{left} bytes after the last matrix or chunk");
+            let found = format!("{} after the last matrix or chunk", counted(left, "byte"));
             return Err(Error::malformed(found, "the end of the file").at(reader.position()));
         }
         let side = |length: u32| usize::try_from(length).unwrap_or(usize::MAX);
@@ -108,10 +109,13 @@ impl Archive {
         match (samples, bytes.and_then(|bytes| u64::try_from(bytes).ok())) {
             (Some(samples), Some(bytes)) if bytes <= self.max_decoded_bytes => Ok(samples),
             (_, bytes) => {
-                let bytes =
-                    bytes.map_or("more bytes than can be counted".to_owned(), |b| format!("{b} bytes"));
+                let bytes = bytes.map_or("more bytes than can be counted".to_owned(), |b| counted(b, "byte"));
                 let expected = format!("at most {}", self.max_decoded_bytes);
-                Err(Error::new(ErrorKind::Limit, format!("{bytes} for {lights} images"), expected))
+                Err(Error::new(
+                    ErrorKind::Limit,
+                    format!("{bytes} for {}", counted(lights, "image")),
+                    expected,
+                ))
             }
         }
     }
@@ -130,7 +134,7 @@ impl Images for Archive {
         }
         if bytes.len() != self.opened_bytes {
             let expected = format!("the {} that were opened", self.opened_bytes);
-            return Err(Error::new(ErrorKind::Argument, format!("{} bytes", bytes.len()), expected));
+            return Err(Error::new(ErrorKind::Argument, counted(bytes.len(), "byte"), expected));
         }
         let samples = self.samples(lights.len())?;
         let factors = match &self.payload {
@@ -269,7 +273,7 @@ fn remarks(
         list.push(("RGB scale factors, not applied", format!("{r}, {g}, {b}")));
     }
     if header.xml_bytes > 0 {
-        list.push(("XML description, not read", format!("{} bytes", header.xml_bytes)));
+        list.push(("XML description, not read", counted(header.xml_bytes, "byte")));
     }
     if rotations > 0 {
         list.push(("local frames, not applied", rotations.to_string()));

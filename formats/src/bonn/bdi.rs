@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::header::{Header, length, read_rotations};
 use super::images::Plane;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, f16};
 
 /// Bytes of one sample.
@@ -80,8 +81,11 @@ impl Bdi {
             let declared = length(reader.u32_le()?);
             let expected = here.saturating_mul(function);
             if declared != expected {
-                let expected = format!("{expected}, {here} functions of {function} bytes");
-                return Err(Error::malformed(format!("a chunk of {declared} bytes"), expected).at(at));
+                let expected =
+                    format!("{expected}, {} of {}", counted(here, "function"), counted(function, "byte"));
+                return Err(
+                    Error::malformed(format!("a chunk of {}", counted(declared, "byte")), expected).at(at)
+                );
             }
             reader.take(declared)?;
             functions = functions.saturating_sub(here);

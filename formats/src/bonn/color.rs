@@ -1,5 +1,6 @@
 //! From the stored channels to reflectance, and back where this crate writes.
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// What is added before a logarithm is taken and subtracted after it is undone.
@@ -106,7 +107,7 @@ impl ColorModel {
             return Ok(());
         }
         let (code, name) = self.describe();
-        let found = format!("{channels} channels in colour model {code} ({name})");
+        let found = format!("{} in colour model {code} ({name})", counted(channels, "channel"));
         Err(Error::malformed(found, "three channels"))
     }
 

@@ -5,6 +5,7 @@ use super::header::{Header, length};
 use super::scalar::Scalar;
 use super::signature::BonnKind;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// The payload of a factorised container.
@@ -106,10 +107,11 @@ impl Sizes {
         }
         let Sizes { pixels, directions, interleaved } = self;
         let expected = format!(
-            "{interleaved} x {directions} and {pixels} rows (directions, pixels) or {interleaved} x {pixels} \
-             and {directions}"
+            "{interleaved} x {directions} and {} (directions, pixels) or {interleaved} x {pixels} \
+             and {directions}",
+            counted(*pixels, "row")
         );
-        Err(Error::malformed(format!("matrices of {left} and {right} rows"), expected))
+        Err(Error::malformed(format!("matrices of {left} and {}", counted(right, "row")), expected))
     }
 }
 
@@ -167,7 +169,7 @@ impl Factors {
         let (rank, left, right) = (reader.u32_le()?, reader.u32_le()?, reader.u32_le()?);
         if rank > declared_rank {
             let expected = format!("at most the {declared_rank} declared before");
-            return Err(Error::malformed(format!("{rank} components"), expected).at(at));
+            return Err(Error::malformed(counted(rank, "component"), expected).at(at));
         }
         let sizes = sizes(header, true, factors.channels);
         factors.push_product(reader, scalar, (rank, left, right), &sizes).map_err(|e| e.at(at))?;
@@ -201,7 +203,7 @@ impl Factors {
             let at = reader.position();
             let slots = reader.u32_le()?;
             if usize::try_from(slots) != Ok(header.views.len()) {
-                let found = format!("{slots} slots for {} views", header.views.len());
+                let found = format!("{} for {}", counted(slots, "slot"), counted(header.views.len(), "view"));
                 return Err(Error::malformed(found, "a slot for each view").at(at));
             }
         }

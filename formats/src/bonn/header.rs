@@ -2,6 +2,7 @@
 
 use super::signature::BonnKind;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Direction, Error, ErrorKind, Limits, Result};
 
 /// What stands in place of the header's size in the older form of PVF.
@@ -74,7 +75,7 @@ impl Header {
         let slots = reader.u32_le()?;
         header.read_directions(reader, limits)?;
         if usize::try_from(slots) != Ok(header.views.len()) {
-            let found = format!("{slots} slots for {} views", header.views.len());
+            let found = format!("{} for {}", counted(slots, "slot"), counted(header.views.len(), "view"));
             return Err(Error::malformed(found, "a slot for each view").at(at));
         }
         Ok(header)
@@ -108,8 +109,10 @@ impl Header {
         }
         let read = reader.position().saturating_sub(start);
         if usize::try_from(size) != Ok(read) {
-            let expected = format!("the {read} bytes that its fields take");
-            return Err(Error::malformed(format!("a header of {size} bytes"), expected).at(start));
+            let expected = format!("the {} that its fields take", counted(read, "byte"));
+            return Err(
+                Error::malformed(format!("a header of {}", counted(size, "byte")), expected).at(start)
+            );
         }
         Ok(header)
     }
@@ -129,7 +132,7 @@ impl Header {
                     self.lights = (0..lights).map(|_| direction(&mut list)).collect::<Result<_>>()?;
                 }
                 Some(first) if first.len() != list.len() => {
-                    let found = format!("{lights} lights for view {view}");
+                    let found = format!("{} for view {view}", counted(lights, "light"));
                     let expected = format!("{}, as for view 0", self.lights.len());
                     return Err(Error::new(ErrorKind::Unsupported, found, expected).at(at));
                 }
@@ -165,7 +168,7 @@ pub(super) fn read_rotations(reader: &mut Reader<'_>, limits: &Limits) -> Result
     let number = reader.u32_le()?;
     if u64::from(number) > limits.max_pixels_per_image {
         let expected = format!("at most {}", limits.max_pixels_per_image);
-        return Err(Error::new(ErrorKind::Limit, format!("{number} rotations"), expected).at(at));
+        return Err(Error::new(ErrorKind::Limit, format!("{}", counted(number, "rotation")), expected).at(at));
     }
     let bytes = reader.take(length(number).saturating_mul(36))?;
     let (numbers, _) = bytes.as_chunks::<4>();
@@ -192,7 +195,7 @@ fn read_channels(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<String>
     }
     if u64::from(number) > limits.max_channels {
         let expected = format!("at most {}", limits.max_channels);
-        return Err(Error::new(ErrorKind::Limit, format!("{number} channels"), expected).at(at));
+        return Err(Error::new(ErrorKind::Limit, counted(number, "channel"), expected).at(at));
     }
     let name = |_| {
         let len = reader.u32_le()?;

@@ -2,6 +2,7 @@
 
 use half::slice::HalfFloatSliceExt;
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result, f16};
 
 /// Type of the numbers in the matrices of a file, little-endian.
@@ -38,7 +39,9 @@ impl Scalar {
             2 => Ok(Scalar::F16),
             4 => Ok(Scalar::F32),
             8 => Ok(Scalar::F64),
-            other => Err(Error::malformed(format!("scalars of {other} bytes"), "2, 4 or 8 bytes")),
+            other => {
+                Err(Error::malformed(format!("scalars of {}", counted(other, "byte")), "2, 4 or 8 bytes"))
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use std::io::Write;
 use super::color::ColorModel;
 use super::header::TEXT_BYTES;
 use super::scalar::Scalar;
+use crate::words::counted;
 use crate::{Direction, Error, ErrorKind, Result};
 
 /// Version of the common header; the one that names the channels.
@@ -116,7 +117,7 @@ impl<W: Write> Writer<W> {
         model.apply(&mut [])?;
         let channels = description.channels.len();
         if singular_values.len() != channels {
-            let found = format!("{} lists of singular values", singular_values.len());
+            let found = format!("{} of singular values", counted(singular_values.len(), "list"));
             return Err(argument(found, format!("{channels}, one for each channel")));
         }
         model.check_channels(channels).map_err(|error| argument(error.to_string(), "channels that fit"))?;
@@ -192,7 +193,7 @@ impl<W: Write> Writer<W> {
         let mut rest = values;
         while !rest.is_empty() {
             if self.lacking == 0 && !self.next_product()? {
-                let found = format!("{} values more than the file has", rest.len());
+                let found = format!("{} more than the file has", counted(rest.len(), "value"));
                 return Err(argument(found, "the end of the values"));
             }
             let fitting = usize::try_from(self.lacking).unwrap_or(usize::MAX).min(BATCH);
@@ -253,7 +254,10 @@ impl Description {
         let mut list = Vec::new();
         let (views, lights, channels) = (self.views.len(), self.lights.len(), self.channels.len());
         if views != lights {
-            list.push(format!("It takes the {lights} lights for the number of views, which is {views}."));
+            list.push(format!(
+                "It takes the {} for the number of views, which is {views}.",
+                counted(lights, "light")
+            ));
         }
         if channels != 3 {
             list.push(format!("It reads 3 channels only; there are {channels}."));
@@ -265,7 +269,7 @@ impl Description {
         let rows = pixels.max(lights.saturating_mul(lights));
         let bytes = [channels, rank, scalar].into_iter().fold(rows, u64::saturating_mul);
         if bytes > u64::from(u32::MAX) {
-            list.push(format!("It counts the {bytes} bytes of the larger matrices in 32 bits."));
+            list.push(format!("It counts the {} of the larger matrices in 32 bits.", counted(bytes, "byte")));
         }
         list
     }

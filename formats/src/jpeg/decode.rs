@@ -12,6 +12,7 @@ use super::frame::Arrangement;
 use super::interleave::interleaved;
 use super::structure::{self, Walked};
 use super::watched::{Marked, Watched};
+use crate::words::counted;
 use crate::{Error, Limits, Result};
 
 /// A decoded image.
@@ -73,7 +74,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     let expected = pixels.saturating_mul(u64::from(header.channels));
     if u64::try_from(samples.len()).ok() != Some(expected) {
         return Err(Error::malformed(
-            format!("{} decoded samples", samples.len()),
+            format!("{}", counted(samples.len(), "decoded sample")),
             format!("{expected}, for {} x {} x {}", header.width, header.height, header.channels),
         ));
     }

@@ -2,6 +2,7 @@
 
 use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, EncodingError, SamplingFactor};
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// Resolution at which the two colour differences are kept.
@@ -65,14 +66,14 @@ pub fn encode(
     let colours = match channels {
         1 => ColorType::Luma,
         3 => ColorType::Rgb,
-        _ => return Err(argument(format!("{channels} channels"), "1 or 3")),
+        _ => return Err(argument(counted(channels, "channel"), "1 or 3")),
     };
     if !(1..=100).contains(&options.quality) {
         return Err(argument(format!("quality {}", options.quality), "1..=100"));
     }
     let needed = u64::from(columns).saturating_mul(u64::from(rows)).saturating_mul(u64::from(channels));
     if u64::try_from(samples.len()).ok() != Some(needed) {
-        let found = format!("{} samples for {width} x {height} x {channels}", samples.len());
+        let found = format!("{} for {width} x {height} x {channels}", counted(samples.len(), "sample"));
         return Err(argument(found, "exactly as many as the product"));
     }
 

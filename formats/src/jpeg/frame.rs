@@ -5,6 +5,7 @@ use super::marker::{entropy_coded, segment};
 use super::means::Means;
 use super::progress::{Band, Progress};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Blocks that one component may have in a coded unit together with others (T.81, B.2.3).
@@ -128,17 +129,18 @@ impl Frame {
         let unsupported =
             |found: String, expected| Error::new(ErrorKind::Unsupported, found, expected).at(at);
         if precision != 8 {
-            return Err(unsupported(format!("{precision} bits a sample"), "8"));
+            return Err(unsupported(format!("{} a sample", counted(precision, "bit")), "8"));
         }
         if width == 0 || height == 0 {
             return Err(Error::malformed(format!("{width} x {height} pixels"), "at least 1 x 1").at(at));
         }
         if channels != 1 && channels != 3 {
-            return Err(unsupported(format!("{channels} components"), "1 or 3"));
+            return Err(unsupported(counted(channels, "component"), "1 or 3"));
         }
         let pixels = u64::from(width).saturating_mul(u64::from(height));
         if pixels > limits.max_pixels_per_image {
-            let expected = format!("at most {} pixels (max_pixels_per_image)", limits.max_pixels_per_image);
+            let expected =
+                format!("at most {} (max_pixels_per_image)", counted(limits.max_pixels_per_image, "pixel"));
             let found = format!("{width} x {height} pixels");
             return Err(Error::new(ErrorKind::Limit, found, expected).at(at));
         }
@@ -239,7 +241,7 @@ impl Frame {
         };
         if data.bytes < bits.div_ceil(8) {
             return Err(Error::malformed(
-                format!("a scan of {} bytes", data.bytes),
+                format!("a scan of {}", counted(data.bytes, "byte")),
                 format!("at least {}, one bit a code", bits.div_ceil(8)),
             )
             .at(data_at));
@@ -250,7 +252,7 @@ impl Frame {
         };
         if data.restarts != restarts {
             return Err(Error::malformed(
-                format!("a scan with {} restart markers", data.restarts),
+                format!("a scan with {}", counted(data.restarts, "restart marker")),
                 format!("{restarts}"),
             )
             .at(data_at));
@@ -299,7 +301,7 @@ impl Frame {
         let blocks = components.map(Component::blocks_per_mcu).fold(0, u64::saturating_add);
         if selected.len() > 1 && blocks > MAX_BLOCKS_PER_UNIT {
             return Err(Error::malformed(
-                format!("a scan whose coded unit has {blocks} blocks"),
+                format!("a scan whose coded unit has {}", counted(blocks, "block")),
                 "at most 10",
             ));
         }

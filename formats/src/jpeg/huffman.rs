@@ -2,6 +2,7 @@
 
 use super::marker;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Longest code, bits.
@@ -119,7 +120,10 @@ impl<'a> Bits<'a> {
     pub(super) fn require_end(&self) -> Result<()> {
         match self.scan.len().saturating_sub(self.at) {
             0 => Ok(()),
-            more => Err(Error::malformed(format!("{more} bytes after the last block of a scan"), "none")),
+            more => Err(Error::malformed(
+                format!("{} after the last block of a scan", counted(more, "byte")),
+                "none",
+            )),
         }
     }
 }

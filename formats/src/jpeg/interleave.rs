@@ -13,6 +13,7 @@ use super::frame::{Grid, Sampling};
 use super::huffman::{Bits, Slot, Table};
 use super::marker;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Coefficients in zigzag order, the first being the mean.
@@ -283,7 +284,7 @@ fn checked_size(size: u8) -> Result<u8> {
     if size <= MAX_SIZE {
         return Ok(size);
     }
-    Err(Error::malformed(format!("a difference of means of {size} bits"), "at most 15"))
+    Err(Error::malformed(format!("a difference of means of {}", counted(size, "bit")), "at most 15"))
 }
 
 /// So small that the difference of any two has [`MAX_SIZE`] bits; samples of 8 bits need 11.

@@ -1,6 +1,7 @@
 //! Markers and what lies between them (ITU-T T.81, B.1.1).
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 // The second byte of the markers that are known by name; the first is 0xFF.
@@ -45,7 +46,9 @@ pub(super) fn segment<'a>(reader: &mut Reader<'a>) -> Result<&'a [u8]> {
     let length = usize::from(reader.u16()?);
     match length.checked_sub(2) {
         Some(rest) => reader.take(rest),
-        None => Err(Error::malformed(format!("a segment of {length} bytes"), "at least 2").at(at)),
+        None => {
+            Err(Error::malformed(format!("a segment of {}", counted(length, "byte")), "at least 2").at(at))
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::huffman::{Bits, Slot, Table};
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Most bits of a difference of means.
@@ -46,7 +47,10 @@ impl Means {
                 for _ in 0..blocks {
                     let size = bits.symbol(table)?;
                     if size > MOST_BITS {
-                        return Err(Error::malformed(format!("a mean of {size} bits"), "at most 15"));
+                        return Err(Error::malformed(
+                            format!("a mean of {}", counted(size, "bit")),
+                            "at most 15",
+                        ));
                     }
                     bits.number(size)?;
                 }

@@ -8,6 +8,7 @@ use super::huffman::{Slot, Table};
 use super::marker;
 use crate::picture::orientation;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// A file that is whole.
@@ -90,9 +91,12 @@ pub(super) fn walk(bytes: &[u8], limits: &Limits) -> Result<Walked> {
                 scans = scans.saturating_add(1);
                 if scans > limits.max_scans_per_image {
                     let expected = format!("at most {} (max_scans_per_image)", limits.max_scans_per_image);
-                    return Err(
-                        Error::new(ErrorKind::Limit, format!("{scans} scans or more"), expected).at(at)
-                    );
+                    return Err(Error::new(
+                        ErrorKind::Limit,
+                        format!("{} or more", counted(scans, "scan")),
+                        expected,
+                    )
+                    .at(at));
                 }
                 let Some(frame) = frame.as_mut() else {
                     return Err(Error::malformed("a scan", "a frame header (SOF) before it").at(at));
@@ -181,6 +185,9 @@ fn read_restart_interval(reader: &mut Reader<'_>) -> Result<u64> {
     let at = reader.position();
     match marker::segment(reader)? {
         [high, low] => Ok(u64::from(u16::from_be_bytes([*high, *low]))),
-        other => Err(Error::malformed(format!("a restart interval of {} bytes", other.len()), "2").at(at)),
+        other => {
+            Err(Error::malformed(format!("a restart interval of {}", counted(other.len(), "byte")), "2")
+                .at(at))
+        }
     }
 }

@@ -8,6 +8,7 @@ use zune_jpeg::zune_core::bytestream::{ZByteIoError, ZByteReaderTrait, ZSeekFrom
 use super::marker;
 use super::structure::Walked;
 use crate::Error;
+use crate::words::counted;
 
 /// Bits that are all set, which is never a code of a Huffman table (T.81, annex C). Where data are missing, the decoder
 /// comes upon them instead of the zeros that it would go on with, which are the codes of something.
@@ -69,7 +70,7 @@ impl Marked {
         if left.iter().all(|&byte| byte == 0) || left.iter().all(|&byte| byte == 0xFF) {
             return Ok(());
         }
-        let found = format!("{} bytes of data after the last block", left.len());
+        let found = format!("{} of data after the last block", counted(left.len(), "byte"));
         Err(Error::malformed(found, "none; the frame header states fewer rows than the data hold"))
     }
 }

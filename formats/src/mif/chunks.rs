@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use crate::reader::Reader;
 use crate::utia::Number;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, request};
 
 /// Type of the first chunk.
@@ -64,7 +65,9 @@ impl<'a> Chunks<'a> {
             let left = reader.rest().len();
             let Some(size) = usize::try_from(length).ok().filter(|&size| size <= left) else {
                 let expected = format!("at most the {left} that are left");
-                return Err(Error::malformed(format!("a chunk of {length} bytes"), expected).at(at));
+                return Err(
+                    Error::malformed(format!("a chunk of {}", counted(length, "byte")), expected).at(at)
+                );
             };
             let data_at = reader.position();
             let data = reader.take(size)?;
@@ -100,7 +103,8 @@ impl<'a> Chunks<'a> {
                 bytes.checked_mul(side)
             });
         if expected.is_none() || u64::try_from(samples.len()).ok() != expected {
-            let found = format!("an image of {width} x {height} x {planes} in {} bytes", samples.len());
+            let found =
+                format!("an image of {width} x {height} x {planes} in {}", counted(samples.len(), "byte"));
             let wanted =
                 expected.map_or_else(|| "what a file can hold".to_owned(), |bytes| bytes.to_string());
             return Err(Error::malformed(found, wanted).at(at));
@@ -114,7 +118,7 @@ impl<'a> Chunks<'a> {
             let expected = format!("at most {} (max_entries)", limits.max_entries);
             return Err(Error::new(
                 ErrorKind::Limit,
-                format!("{} images or more", self.images.len()),
+                format!("{} or more", counted(self.images.len(), "image")),
                 expected,
             )
             .at(at));
@@ -130,7 +134,7 @@ fn read_signature(reader: &mut Reader<'_>) -> Result<()> {
     }
     let length = reader.u64_le()?;
     if length != 8 {
-        return Err(Error::malformed(format!("a first chunk of {length} bytes"), "8").at(0usize));
+        return Err(Error::malformed(format!("a first chunk of {}", counted(length, "byte")), "8").at(0usize));
     }
     match reader.u64_le()? {
         VERSION => Ok(()),

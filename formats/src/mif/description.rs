@@ -5,6 +5,7 @@ use roxmltree::{Document, Node};
 use super::Options;
 use crate::ubo2003::Angles;
 use crate::utia::{Order, Pair, below_the_surface, light_and_view};
+use crate::words::counted;
 use crate::{Direction, Error, ErrorKind, Result};
 
 /// One BTF of a file.
@@ -32,7 +33,7 @@ impl Description {
         }
         if pairs.len() != images {
             let expected = format!("{} for the order {order:?}", pairs.len());
-            return Err(Error::new(ErrorKind::Argument, format!("{images} images"), expected));
+            return Err(Error::new(ErrorKind::Argument, counted(images, "image"), expected));
         }
         Ok(Description {
             images: numbered_from(0, pairs.len())?,
@@ -151,7 +152,7 @@ fn chosen<'a, 'i>(root: Node<'a, 'i>, id: Option<&str>) -> Result<Node<'a, 'i>> 
         (_, []) => Err(malformed("XML without a btf element".to_owned(), "at least one")),
         (None, several) => Err(Error::new(
             ErrorKind::Argument,
-            format!("{} btf elements and none chosen", several.len()),
+            format!("{} and none chosen", counted(several.len(), "btf element")),
             format!("one of {}", names()),
         )),
         (Some(id), _) => all.iter().find(|node| node.attribute("id") == Some(id)).copied().ok_or_else(|| {
@@ -164,7 +165,7 @@ fn chosen<'a, 'i>(root: Node<'a, 'i>, id: Option<&str>) -> Result<Node<'a, 'i>> 
 fn refuse_mipmaps(btf: Node<'_, '_>) -> Result<()> {
     let levels = child(btf, "mipmap").map_or(0, |mipmap| children(mipmap, "item").count());
     if levels > 1 {
-        let found = format!("images of {levels} mipmap levels");
+        let found = format!("images of {}", counted(levels, "mipmap level"));
         return Err(Error::new(ErrorKind::Unsupported, found, "images of one level"));
     }
     Ok(())
@@ -196,7 +197,7 @@ fn images(btf: Node<'_, '_>, count: usize) -> Result<Vec<u64>> {
         return match numbers {
             Some(numbers) if numbers.len() == count => Ok(numbers),
             Some(numbers) => Err(Error::malformed(
-                format!("an index-map of {} images", numbers.len()),
+                format!("an index-map of {}", counted(numbers.len(), "image")),
                 format!("{count}, as there are directions"),
             )),
             None => Err(malformed("an index-map of other things".to_owned(), "whole numbers and commas")),

@@ -3,6 +3,7 @@
 use roxmltree::{Document, ParsingOptions};
 
 use crate::text::utf8;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Attributes of one element; published ones have ten at most. The parser compares each with all others of its element.
@@ -36,7 +37,11 @@ pub(super) fn parse<'a>(text: &'a str, limits: &Limits) -> Result<Document<'a>> 
 pub(super) fn text(bytes: &[u8], limits: &Limits) -> Result<String> {
     if u64::try_from(bytes.len()).is_ok_and(|length| length > limits.max_entry_bytes) {
         let expected = format!("at most {} (max_entry_bytes)", limits.max_entry_bytes);
-        return Err(Error::new(ErrorKind::Limit, format!("{} bytes of XML", bytes.len()), expected));
+        return Err(Error::new(
+            ErrorKind::Limit,
+            format!("{} of XML", counted(bytes.len(), "byte")),
+            expected,
+        ));
     }
     let Ok(text) = String::from_utf8(utf8(bytes)?.into_owned()) else {
         return Err(Error::malformed("XML that is not UTF-8", "UTF-8"));

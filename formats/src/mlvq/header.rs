@@ -1,6 +1,7 @@
 //! The 18 lines of text that a database begins with.
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, request};
 
 /// Longest line that is looked for; published ones have 170 characters.
@@ -112,8 +113,12 @@ impl Header {
             Ok(count) if (least..=360).contains(&count) => Ok(count),
             _ => {
                 let expected = format!("{least} to 360");
-                Err(Error::new(ErrorKind::Unsupported, format!("{count} nodes of an angle"), expected)
-                    .at(shape.at))
+                Err(Error::new(
+                    ErrorKind::Unsupported,
+                    format!("{} of an angle", counted(count, "node")),
+                    expected,
+                )
+                .at(shape.at))
             }
         };
         Line::read(reader)?; // 10 zeros

@@ -1,6 +1,7 @@
 //! The two kinds of tables of a database.
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// Both kinds are padded to whole words of this size, and always have room for one bit more.
@@ -175,7 +176,7 @@ pub(super) fn require_end(reader: &Reader<'_>) -> Result<()> {
         0 => Ok(()),
         more => Err(Error::new(
             ErrorKind::Malformed,
-            format!("{more} bytes after the last table"),
+            format!("{} after the last table", counted(more, "byte")),
             "the end of the file",
         )
         .at(reader.position())),

@@ -14,6 +14,7 @@
 
 use super::functions::Functions;
 use super::table::FloatTable;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 /// Tables that have zero bytes, by the names in the encoder's text files.
@@ -112,8 +113,11 @@ impl ZeroBytes {
         for entry in self.entries.iter().filter(|entry| entry.table == name) {
             let about = format!("the line {name} {} {} {}", entry.row, entry.column, entry.value);
             if entry.column >= table.columns || entry.row >= table.rows {
-                let expected =
-                    format!("places in the table's {} rows and {} columns", table.rows, table.columns);
+                let expected = format!(
+                    "places in the table's {} and {}",
+                    counted(table.rows, "row"),
+                    counted(table.columns, "column")
+                );
                 return Err(Error::new(ErrorKind::Argument, about, expected));
             }
             let place = entry.row.saturating_mul(table.columns).saturating_add(entry.column);

@@ -4,8 +4,10 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::fields::{Field, Forms, NumberPrefix, Unit, goes_on};
+use crate::behind::{Digits, Unit, names_another_unit, unit_behind};
+use crate::fields::{Field, Forms, NumberPrefix};
 use crate::file_name::picture_stem;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Pair, Result};
 
 /// Longest text of a pattern, bytes.
@@ -17,10 +19,11 @@ const MAX_BYTES: usize = 1024;
 /// | --- | --- |
 /// | `{theta_i}` `{phi_i}` | angles of the light, a decimal number in degrees; theta 0..=90, phi any |
 /// | `{theta_v}` `{phi_v}` | angles of the view |
-/// | `{theta_i:rad}` ... | the same in radians (`:deg` is the default) |
+/// | `{theta_i:rad}` ... | the same in radians |
+/// | `{theta_i:deg}` ... | degrees, whatever text stands behind (without it another unit there is refused) |
 /// | `{x_i}` `{y_i}` `{z_i}`, `{x_v}` ... | a vector towards the light or the viewer, of any length |
 /// | `{n}` | digits that do not matter |
-/// | `{*}` | anything within one part of the path, or nothing; after a number not `,5`, `p5`, `e1`, `rad` and the like |
+/// | `{*}` | anything within one part of the path, or nothing; behind a number not `,5`, `p5`, `rad`, `x10` and the like |
 /// | other text | itself, without regard to ASCII case |
 ///
 /// A pattern with `/` is compared with as many parts from the end of a path as it has; one without, with the
@@ -52,7 +55,7 @@ pub struct Pattern {
 #[derive(Debug, Clone, PartialEq)]
 enum Token {
     Text(String),
-    Number { field: Field, radians: bool },
+    Number { field: Field, unit: Option<Unit> },
     Digits,
     Anything,
 }
@@ -66,7 +69,7 @@ impl Pattern {
     pub fn parse(text: &str) -> Result<Pattern> {
         let wrong = |found: String, expected| Error::new(ErrorKind::Argument, found, expected);
         if text.len() > MAX_BYTES {
-            return Err(wrong(format!("a pattern of {} bytes", text.len()), "at most 1024 bytes"));
+            return Err(wrong(format!("a pattern of {}", counted(text.len(), "byte")), "at most 1024 bytes"));
         }
         let parts: Vec<Vec<Token>> = text.split('/').map(tokens).collect::<Result<_>>()?;
         let fields: Vec<Field> = parts
@@ -147,14 +150,14 @@ fn tokens(part: &str) -> Result<Vec<Token>> {
                     "other text there, as numbers take all digits",
                 );
             }
-            if let Some(Token::Number { field, radians: false }) = tokens.last()
+            if let Some(Token::Number { field, unit: None }) = tokens.last()
                 && field.is_angle()
-                && Unit::of(text) != Unit::Degrees
+                && names_another_unit(left)
             {
                 let name = field.name();
                 return wrong(
                     format!("{text:?} behind {{{name}}}, which is in degrees"),
-                    "{theta_i:rad} and so on for radians; other units are not read",
+                    "{theta_i:rad} and so on for radians, {theta_i:deg} where they are degrees all the same; other units are not read",
                 );
             }
             tokens.push(Token::Text(text.to_owned()));
@@ -187,9 +190,13 @@ fn token(text: &str) -> Result<Token> {
     let token = match (name, Field::named(name), unit) {
         ("*", _, None) => Some(Token::Anything),
         ("n", _, None) => Some(Token::Digits),
-        (_, Some(field), None) => Some(Token::Number { field, radians: false }),
-        (_, Some(field), Some("deg")) if field.is_angle() => Some(Token::Number { field, radians: false }),
-        (_, Some(field), Some("rad")) if field.is_angle() => Some(Token::Number { field, radians: true }),
+        (_, Some(field), None) => Some(Token::Number { field, unit: None }),
+        (_, Some(field), Some("deg")) if field.is_angle() => {
+            Some(Token::Number { field, unit: Some(Unit::Degrees) })
+        }
+        (_, Some(field), Some("rad")) if field.is_angle() => {
+            Some(Token::Number { field, unit: Some(Unit::Radians) })
+        }
         _ => None,
     };
     let expected = "theta_i, phi_i, x_i, y_i, z_i, the same with _v, :rad after an angle, n or *";
@@ -216,18 +223,22 @@ fn fits(
             let rest = text.trim_start_matches(|c: char| c.is_ascii_digit());
             rest.len() < text.len() && fits(later, rest, values, failed)
         }
-        Token::Number { field, radians } => {
+        Token::Number { field, unit } => {
             let Some(NumberPrefix { whole, all }) = NumberPrefix::of(text) else { return false };
             let lengths = [Some(all), Some(whole).filter(|&whole| whole != all)];
             lengths.into_iter().flatten().any(|length| {
                 let Some((number, rest)) = text.split_at_checked(length) else { return false };
                 let Ok(value) = number.parse::<f64>() else { return false };
-                let other_unit = !radians && field.is_angle() && Unit::of(rest) != Unit::Degrees;
-                if later.first() == Some(&Token::Anything) && (goes_on(rest) || other_unit) {
-                    return false;
+                if later.first() == Some(&Token::Anything) {
+                    match unit_behind(rest, Digits::Separate) {
+                        Ok(Unit::Degrees) => {}
+                        Ok(Unit::Radians) if *unit == Some(Unit::Radians) => {}
+                        _ => return false,
+                    }
                 }
+                let radians = *unit == Some(Unit::Radians);
                 let before = values.len();
-                values.push((*field, if *radians { value.to_degrees() } else { value }));
+                values.push((*field, if radians { value.to_degrees() } else { value }));
                 let fit = fits(later, rest, values, failed);
                 if !fit {
                     values.truncate(before);
@@ -267,6 +278,16 @@ mod tests {
             let error = Pattern::parse(pattern).unwrap_err().to_string();
             assert!(error.contains("which is in degrees") && error.contains(":rad"), "{error}");
         }
+        for pattern in [
+            "{theta_i}pi_{phi_i}pi",
+            "{theta_i}mil {phi_i}mil",
+            "{theta_i}_arcmin_{phi_i}",
+            "{theta_i}cdeg_{phi_i}",
+        ] {
+            assert!(Pattern::parse(pattern).is_err(), "{pattern}");
+        }
+        assert!(angles("ti{theta_i}_pi{phi_i}", "ti15_pi30.png").is_some());
+        assert!(angles("{theta_i:deg}mil_{phi_i:deg}g", "15mil_30g.png").is_some());
         assert!(angles("{theta_i:rad}rad {phi_i:rad}rad", "0.5rad 1rad.png").is_some());
         assert!(angles("{theta_i:rad}{*}_{phi_i:rad}{*}", "0.5rad_1rad.png").is_some());
         assert_eq!(angles("{theta_i}{*}_{phi_i}{*}", "15_30rad.png"), None);
@@ -305,6 +326,9 @@ mod tests {
             ("a/{theta_i}_{phi_i}", "15_30.png"),
             ("a/{theta_i}_{phi_i}", "b/15_30.png"),
             ("{x_i}_{y_i}_{z_i}", "0_0_0.png"),
+            ("l{theta_i}{*}_p{phi_i}{*}", "l7point5_p30.png"),
+            ("l{theta_i}{*}_p{phi_i}{*}", "l7 .5_p30.png"),
+            ("l{theta_i}{*}_p{phi_i}{*}", "l7_p30x10.png"),
             ("l{theta_i}{*}_p{phi_i}{*}", "l7,5_p30.png"),
             ("l{theta_i}{*}_p{phi_i}{*}", "l7_p30e1.png"),
             ("ä{theta_i}_{phi_i}", "é1_2.png"),
@@ -353,7 +377,7 @@ mod tests {
     #[test]
     fn many_stars_on_a_long_name_take_no_time() {
         let pattern = Pattern::parse(&format!("{{theta_i}}_{{phi_i}}{}b", "{*}a".repeat(200))).unwrap();
-        let name = format!("1_2{}.png", "a".repeat(20_000));
+        let name = format!("1_2_{}.png", "a".repeat(20_000));
         assert_eq!(pattern.angles(&name), None);
         assert!(pattern.angles(&name.replace(".png", "b.png")).is_some());
     }

@@ -3,33 +3,11 @@
 use std::collections::HashMap;
 
 use super::Pattern;
-use crate::fields::{Component, Field, NumberPrefix, Side, Unit, digits_are_left};
+use crate::behind::{Digits, KNOWN_FORMS, Unit, unit_behind};
+use crate::fields::{Component, Field, NumberPrefix, Side};
 use crate::file_name::{base, picture_stem};
+use crate::labels::{SEPARATORS, direction_label, ends_with_word, number_label};
 use crate::{Error, ErrorKind, Result};
-
-/// Words that say what a number is, before the word of its side.
-const COMPONENTS: [(&str, Component); 7] = [
-    ("theta", Component::Theta),
-    ("t", Component::Theta),
-    ("phi", Component::Phi),
-    ("p", Component::Phi),
-    ("x", Component::X),
-    ("y", Component::Y),
-    ("z", Component::Z),
-];
-
-/// Words of the light (or what comes in) and of the view (or what goes out).
-const SIDES: [(&str, Side); 6] = [
-    ("light", Side::Light),
-    ("l", Side::Light),
-    ("i", Side::Light),
-    ("view", Side::View),
-    ("v", Side::View),
-    ("o", Side::View),
-];
-
-/// What may stand between a label and its number, or between two angles of one label.
-const SEPARATORS: [char; 5] = ['_', '-', ' ', '=', ','];
 
 /// What one label is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,11 +46,11 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
         return Err(unsupported("no picture".to_owned(), "pictures with angles in their names"));
     };
     let pattern = pattern_of(first).ok_or_else(|| {
+        if let Some(unread) = unread_behind(first) {
+            return unsupported(format!("the name {first:?} with {unread}"), KNOWN_FORMS);
+        }
         unsupported(
-            format!(
-                "the name {first:?}, whose numbers carry no labels of a whole direction, or more digits or another unit \
-                 behind them"
-            ),
+            format!("the name {first:?}, whose numbers carry no labels of a whole direction, in one unit"),
             "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0`, degrees with decimal points, or a pattern that says what \
              is what",
         )
@@ -80,6 +58,9 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
     let mut seen = HashMap::new();
     for &name in &pictures {
         let Some(pair) = pattern.angles(name) else {
+            if let Some(unread) = unread_behind(name) {
+                return Err(unsupported(format!("the name {name:?} with {unread}"), KNOWN_FORMS));
+            }
             let found =
                 format!("the name {name:?}, which does not fit the pattern {:?}", pattern.to_string());
             return Err(unsupported(found, "all pictures named alike, or a pattern for those that count"));
@@ -168,12 +149,17 @@ impl Labels {
             let own = number_label(before).zip(NumberPrefix::of(number));
             let shared = direction_label(before).and_then(|side| two_angles(side, number));
             let found = match (self, own, shared) {
+                // What looks like a light or a view that cannot be read is not passed over.
+                (Labels::Directions, None, None) if unread_direction(before, number).is_some() => {
+                    return None;
+                }
                 (_, None, None) => None,
                 (Labels::Numbers, Some((field, prefix)), _) => {
                     let signed =
                         before.strip_suffix('-').filter(|rest| !dashes_separate || rest.ends_with('-'));
                     before = signed.filter(|_| field.may_be_negative()).unwrap_or(before);
-                    Some((braced(field, Unit::of(number.get(prefix.all..)?)), prefix.all))
+                    let unit = unit_behind(number.get(prefix.all..)?, Digits::Doubted).ok()?;
+                    Some((braced(field, unit), prefix.all))
                 }
                 (Labels::Directions, None, Some((fields, length)))
                     if !another_number(number.get(length..)?) =>
@@ -183,13 +169,6 @@ impl Labels {
                 // Both ways of labelling, or a label with three numbers: what is meant cannot be known.
                 _ => return None,
             };
-            // Digits that belong to no label, right behind a number of one: it may have been read by half.
-            if let Some((_, length)) = &found
-                && (digits_are_left(number.get(*length..)?)
-                    || Unit::of(number.get(*length..)?) == Unit::Other)
-            {
-                return None;
-            }
             let digits = || number.len().saturating_sub(after_digits(number).len());
             let (fields, length) = found.unwrap_or_else(|| ("{n}".to_owned(), digits()));
             pattern.push_str(before);
@@ -223,28 +202,41 @@ fn dashes_separate(part: &str) -> bool {
     false
 }
 
-/// The field whose label a text ends with, separators aside.
-fn number_label(before: &str) -> Option<Field> {
-    COMPONENTS.iter().find_map(|&(word, component)| {
-        SIDES.iter().find_map(|&(of, side)| {
-            let labels = [format!("{word}{of}"), format!("{word}_{of}")];
-            labels.iter().any(|label| ends_with_word(before, label)).then_some(Field::new(side, component))
-        })
+/// What stands behind the number of a label in a name and is not known, for messages: `"point5" behind the 4 of ...`.
+pub fn unread_behind(name: &str) -> Option<String> {
+    let parts = picture_stem(name)?.rsplit(['/', '\\']).take(MOST_FOLDERS);
+    parts.into_iter().find_map(|part| {
+        let mut left = part;
+        while let Some((before, number)) = split_at_digit(left) {
+            let unread = match number_label(before) {
+                Some(_) => behind_first(number),
+                None => unread_direction(before, number),
+            };
+            if unread.is_some() {
+                return unread;
+            }
+            left = after_digits(number);
+        }
+        None
     })
 }
 
-/// The side whose label a text ends with, separators aside.
-fn direction_label(before: &str) -> Option<Side> {
-    SIDES.iter().find_map(|&(word, side)| ends_with_word(before, word).then_some(side))
+/// The same for the number of a label that theta and phi share, if it is none of these.
+fn unread_direction(before: &str, number: &str) -> Option<String> {
+    let side = direction_label(before)?;
+    let fraction = NumberPrefix::of(number)?.all;
+    let theta = number.get(fraction..)?;
+    match theta.strip_prefix(SEPARATORS).filter(|phi| NumberPrefix::of(phi).is_some()) {
+        Some(phi) if two_angles(side, number).is_none() => behind_first(phi),
+        Some(_) => None,
+        None => behind_first(number),
+    }
 }
 
-/// Whether a text, less the separators at its end, ends with this word in any case, with no letter before it.
-fn ends_with_word(text: &str, word: &str) -> bool {
-    let text = text.trim_end_matches(SEPARATORS);
-    let start = text.len().checked_sub(word.len());
-    start.and_then(|start| text.split_at_checked(start)).is_some_and(|(before, found)| {
-        found.eq_ignore_ascii_case(word) && !before.ends_with(char::is_alphabetic)
-    })
+fn behind_first(number: &str) -> Option<String> {
+    let (value, rest) = number.split_at_checked(NumberPrefix::of(number)?.all)?;
+    let unknown = unit_behind(rest, Digits::Doubted).err()?;
+    Some(format!("{unknown:?} behind the angle {value}"))
 }
 
 /// Whether nothing but separators stands before the next number.
@@ -259,7 +251,7 @@ fn two_angles(side: Side, text: &str) -> Option<(String, usize)> {
     let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
     let phi = rest.strip_prefix(separator)?;
     let after = phi.get(NumberPrefix::of(phi)?.all..)?;
-    let unit = Unit::of(after);
+    let unit = unit_behind(after, Digits::Doubted).ok()?;
     let [theta, phi] =
         [Component::Theta, Component::Phi].map(|component| braced(Field::new(side, component), unit));
     Some((format!("{theta}{separator}{phi}"), text.len().checked_sub(after.len())?))
@@ -385,6 +377,19 @@ mod tests {
             ("tl15_pl30_gon.png", ""),
             ("l15_30gon_v0_0gon.png", ""),
             ("tl15deg30_pl30.png", ""),
+            ("tl4point5_pl0.png", ""),
+            ("tl4 .5_pl0.png", ""),
+            ("tl4_pt5_pl0.png", ""),
+            ("tl4_pl0..5.png", ""),
+            ("tl0.5pi_pl0pi.png", ""),
+            ("tl4mil_pl0mil.png", ""),
+            ("tl4x10_pl0.png", ""),
+            ("l15_30_v4point5_0.png", ""),
+            ("l15_30point5_v0_0.png", ""),
+            ("l15_30_v0_0x10.png", ""),
+            ("view_4point5_20/light_30_40.png", ""),
+            ("tv4_5p5_pv0/tl30_pl40.png", ""),
+            ("wool_v2_l15_30.png", "wool_v{n}_l{theta_i}_{phi_i}"),
         ] {
             let found = recognise([name]).map(|pattern| pattern.to_string()).unwrap_or_default();
             assert_eq!(found, pattern, "{name}");

@@ -9,6 +9,7 @@ use crate::catalogue::repeated_direction;
 use crate::directions::published_name;
 use crate::file_name::repeated;
 use crate::text::utf8;
+use crate::words::counted;
 use crate::{Angles, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
 /// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0
@@ -72,7 +73,7 @@ impl Archive {
     pub fn open(bytes: &[u8], beside: Beside, limits: &Limits) -> Result<Archive> {
         let header = Header::read(bytes)?;
         let [views, lights, height, width, channels] = header.shape[..] else {
-            let found = format!("an array of {} axes", header.shape.len());
+            let found = format!("an array of {}", counted(header.shape.len(), "dimension"));
             return Err(Error::new(ErrorKind::Unsupported, found, "the axes view, light, y, x, channel"));
         };
         if header.shape.contains(&0) {
@@ -127,7 +128,8 @@ impl Images for Archive {
         let (n_views, n_lights) = (self.contents.views.len(), self.contents.lights.len());
         if view >= n_views || lights.start > lights.end || lights.end > n_lights {
             let found = format!("view {view}, lights {}..{}", lights.start, lights.end);
-            let expected = format!("one of {n_views} views and some of {n_lights} lights");
+            let expected =
+                format!("one of {} and some of {}", counted(n_views, "view"), counted(n_lights, "light"));
             return Err(Error::new(ErrorKind::Argument, found, expected));
         }
         let data = self.header.data(bytes)?;
@@ -138,10 +140,13 @@ impl Images for Archive {
         };
         let wanted = at(lights.start).zip(at(lights.end)).and_then(|(start, end)| data.get(start..end));
         let wanted = wanted.ok_or_else(|| {
-            Error::malformed(format!("{} bytes of data", data.len()), "those of the images asked for")
+            Error::malformed(
+                format!("{} of data", counted(data.len(), "byte")),
+                "those of the images asked for",
+            )
         })?;
         if u64::try_from(wanted.len()).unwrap_or(u64::MAX) > self.max_decoded_bytes {
-            let found = format!("{} bytes of samples at once", wanted.len());
+            let found = format!("{} of samples at once", counted(wanted.len(), "byte"));
             return Err(Error::new(ErrorKind::Limit, found, format!("at most {}", self.max_decoded_bytes)));
         }
         let big = self.header.big_endian;
@@ -199,7 +204,7 @@ fn named(count: u64, given: Option<Vec<String>>) -> Result<Vec<String>> {
     if u64::try_from(names.len()).ok() == Some(count) {
         return Ok(names);
     }
-    let found = format!("{} names of channels in NAME.channels.txt", names.len());
+    let found = format!("{} of channels in NAME.channels.txt", counted(names.len(), "name"));
     Err(Error::malformed(found, format!("{count} as in the array; mend that file, or move it away")))
 }
 
@@ -224,7 +229,7 @@ fn checked(axis: &str, count: u64, given: Option<Vec<Direction>>) -> Result<Vec<
         return Err(Error::new(ErrorKind::Argument, found, expected));
     };
     if u64::try_from(list.len()).ok() != Some(count) {
-        let found = format!("{} directions of {axis} beside the array", list.len());
+        let found = format!("{} of {axis} beside the array", counted(list.len(), "direction"));
         return wrong(
             found,
             format!("{count} as in the array, of NAME.{axis}.npy or the list that was named"),

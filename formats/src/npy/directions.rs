@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::header::{Header, Scalar, elements, write};
+use crate::words::counted;
 use crate::{Angles, Direction, Error, ErrorKind, Limits, Result};
 
 /// Reads a list of directions: `[n, 2]` theta and phi in radians, or `[n, 3]` vectors of any length, x right,
@@ -26,7 +27,7 @@ pub fn directions(bytes: &[u8], limits: &Limits) -> Result<Vec<Direction>> {
     if count > limits.max_directions {
         return Err(Error::new(
             ErrorKind::Limit,
-            format!("{count} directions"),
+            counted(count, "direction"),
             format!("at most {}", limits.max_directions),
         ));
     }

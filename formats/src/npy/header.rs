@@ -1,6 +1,7 @@
 //! The header: magic bytes, version, and a Python dictionary of three keys.
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
@@ -77,7 +78,7 @@ impl Header {
         let start = reader.position();
         let length =
             usize::try_from(length).ok().filter(|&length| length <= MAX_DICTIONARY).ok_or_else(|| {
-                let found = format!("a header of {length} bytes");
+                let found = format!("a header of {}", counted(length, "byte"));
                 Error::new(ErrorKind::Limit, found, "at most 10000 bytes, as numpy reads").at(start)
             })?;
         let dictionary = reader.take(length)?;
@@ -97,13 +98,13 @@ impl Header {
         let expected = self.elements().and_then(|n| n.checked_mul(u64::try_from(self.scalar.bytes()).ok()?));
         if expected.is_none() || expected != u64::try_from(data.len()).ok() {
             let found = format!(
-                "{} bytes of data for the shape {:?} of {}",
-                data.len(),
+                "{} of data for the shape {:?} of {}",
+                counted(data.len(), "byte"),
                 self.shape,
                 self.scalar.code()
             );
             let expected =
-                expected.map_or("a shape that fits into memory".to_owned(), |n| format!("{n} bytes"));
+                expected.map_or("a shape that fits into memory".to_owned(), |n| counted(n, "byte"));
             return Err(Error::malformed(found, expected).at(self.length));
         }
         Ok(data)

@@ -54,7 +54,7 @@ fn of_header(header: &Header) -> PictureHeader {
         sample_type: header.channels.sample_type(),
         linear: true,
         scanlines_are_columns: false,
-        orientation: 1,
+        orientation: header.orientation,
         profile: header.profile.clone(),
         remarks: remarks(header),
     }
@@ -68,5 +68,5 @@ fn remarks(header: &Header) -> Vec<String> {
     let windows = header.windows.map(|[data, shown]| {
         format!("the data window {data:?} is the picture, and not the display window {shown:?}")
     });
-    layer.into_iter().chain(left_out).chain(windows).collect()
+    layer.into_iter().chain(left_out).chain(windows).chain(header.not_applied.iter().cloned()).collect()
 }

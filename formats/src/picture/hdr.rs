@@ -14,6 +14,7 @@ use header::{Axis, Header};
 
 use super::{HdrOrientation, Picture, PictureHeader};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result, SampleType, Samples};
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
@@ -81,7 +82,7 @@ fn require_end(reader: &Reader<'_>) -> Result<()> {
     if reader.rest().is_empty() {
         return Ok(());
     }
-    let found = format!("{} bytes after the last scan line", reader.rest().len());
+    let found = format!("{} after the last scan line", counted(reader.rest().len(), "byte"));
     Err(Error::malformed(found, "none").at(reader.position()))
 }
 
@@ -96,7 +97,7 @@ fn of_header(header: &Header) -> PictureHeader {
         // The resolution line says where the first pixel lies, and is obeyed.
         orientation: 1,
         profile: header.profile.clone(),
-        remarks: Vec::new(),
+        remarks: header.remarks.clone(),
     }
 }
 

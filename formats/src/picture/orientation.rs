@@ -4,7 +4,7 @@
 //! Samples are handed out as stored, whatever is asked for: a camera that looks down writes what its sensor of
 //! gravity makes of that, and the lights' directions are of the picture as it was taken. The caller is told.
 
-use super::tiff;
+use super::{tiff, xmp};
 
 /// What XMP in a JPEG begins with.
 pub(crate) const XMP: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
@@ -14,6 +14,8 @@ pub(crate) const EXIF: &[u8] = b"Exif\0\0";
 
 /// Of a block of Exif data, which is a TIFF without a picture: 1..=8, and 1 where it says nothing usable.
 pub(crate) fn of_exif(block: &[u8]) -> u8 {
+    // Where a block stands alone, some writers leave what it begins with in a JPEG.
+    let block = block.strip_prefix(EXIF).unwrap_or(block);
     // Not every camera writes the offset of a next directory behind the first.
     let found = tiff::orientation(&[block, &[0; 8]].concat()).unwrap_or(1);
     u8::try_from(found).ok().filter(|value| (1..=8).contains(value)).unwrap_or(1)
@@ -21,10 +23,12 @@ pub(crate) fn of_exif(block: &[u8]) -> u8 {
 
 /// Of a packet of XMP, as an attribute or an element; 1 where it says nothing.
 pub(crate) fn of_xmp(packet: &[u8]) -> u8 {
-    const NAME: &[u8] = b"tiff:Orientation";
-    let value = memchr::memmem::find(packet, NAME).and_then(|at| packet.get(at.checked_add(NAME.len())?..));
-    let digit = value.and_then(|rest| rest.iter().find(|byte| !b"=\"'> \t\r\n".contains(byte)));
-    digit.and_then(|digit| digit.checked_sub(b'0')).filter(|value| (1..=8).contains(value)).unwrap_or(1)
+    let stated = xmp::values(packet, "http://ns.adobe.com/tiff/1.0/", "tiff", "Orientation");
+    let one_digit = |value: &&[u8]| match value {
+        [digit @ b'1'..=b'8'] => digit.checked_sub(b'0'),
+        _ => None,
+    };
+    stated.iter().find_map(one_digit).unwrap_or(1)
 }
 
 /// Of the data of a JPEG's segment for applications: Exif or XMP.

@@ -15,6 +15,7 @@ use ::png::{
 
 use super::alpha::without_alpha;
 use super::{Picture, PictureHeader, grey_or_rgb};
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, Samples};
 
 pub(super) use chunks::SIGNATURE;
@@ -39,7 +40,7 @@ fn of_image(image: &chunks::ImageHeader, bytes: &[u8]) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: said.orientation(),
         profile: said.profile(),
-        remarks: Vec::new(),
+        remarks: said.remarks(),
     }
 }
 
@@ -120,7 +121,7 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>> {
         other => {
             return Err(Error::new(
                 ErrorKind::Argument,
-                format!("{other} channels"),
+                counted(other, "channel"),
                 "1 or 3 channels for a PNG",
             ));
         }

@@ -1,7 +1,8 @@
 //! What a picture says of its colours, where that is not what integers are taken for: sRGB. Nothing of it is applied;
 //! the caller is told.
 
-use super::tiff;
+use super::orientation::EXIF;
+use super::{tiff, xmp};
 use crate::reader::Reader;
 
 /// Longest name of a profile that is told, characters.
@@ -60,6 +61,7 @@ pub(crate) fn of_chromaticities(found: &[f64]) -> Option<String> {
 
 /// Of a block of Exif data: a colour space that is none or another than sRGB, as cameras state Adobe RGB.
 pub(crate) fn of_exif(block: &[u8]) -> Option<String> {
+    let block = block.strip_prefix(EXIF).unwrap_or(block);
     // As for the orientation: not every camera writes the offset of a next directory behind the last.
     of_exif_space(tiff::exif_colour_space(&[block, &[0; 8]].concat()).ok().flatten())
 }
@@ -71,6 +73,38 @@ pub(crate) fn of_exif_space(number: Option<u64>) -> Option<String> {
         Some(0xFFFF) => Some("the Exif colour space \"uncalibrated\" (Adobe RGB, perhaps)".to_owned()),
         _ => None,
     }
+}
+
+/// Of a packet of XMP: the name of a profile, else the number of a colour space; `None` if that is sRGB.
+pub(crate) fn of_xmp(packet: &[u8]) -> Option<String> {
+    let photoshop = xmp::values(packet, "http://ns.adobe.com/photoshop/1.0/", "photoshop", "ICCProfile");
+    let text = |value: &&[u8]| String::from_utf8_lossy(value).into_owned();
+    if let Some(name) = photoshop.first().map(text).filter(|name| !name.is_empty()) {
+        let shown: String = name.chars().take(LONGEST_NAME).collect();
+        return (!is_srgb(&name)).then(|| format!("the ICC profile {shown:?} (XMP)"));
+    }
+    let space = xmp::values(packet, "http://ns.adobe.com/exif/1.0/", "exif", "ColorSpace");
+    of_exif_space(space.first().and_then(|value| text(value).parse().ok()))
+}
+
+/// Of the name of a colour space (`oiio:ColorSpace`, `colorInteropID`); `None` if it is what samples are taken for: sRGB,
+/// or the same primaries in linear light.
+pub(crate) fn of_space_name(name: &str, linear: bool) -> Option<String> {
+    const LINEAR: [&str; 8] = [
+        "linear",
+        "scenelinear",
+        "linrec709",
+        "linrec709scene",
+        "linsrgb",
+        "linearsrgb",
+        "linearrec709",
+        "linearrec709srgb",
+    ];
+    const ENCODED: [&str; 4] = ["srgb", "srgbrec709scene", "srgbrec709display", "srgbtexture"];
+    let bare: String = name.chars().filter(|c| c.is_alphanumeric()).collect::<String>().to_lowercase();
+    let expected: &[&str] = if linear { &LINEAR } else { &ENCODED };
+    let shown: String = name.chars().take(LONGEST_NAME).collect();
+    (!bare.is_empty() && !expected.contains(&bare.as_str())).then(|| format!("the colour space {shown:?}"))
 }
 
 /// The text of the tag `desc`, in the first language that there is.

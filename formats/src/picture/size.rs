@@ -1,5 +1,6 @@
 //! The size that a header claims, held against [`Limits`] before anything is allocated.
 
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result, SampleType};
 
 /// Columns, rows and channels of a picture, all at least 1 and within the limits.
@@ -20,7 +21,7 @@ impl Size {
         limits: &Limits,
     ) -> Result<Size> {
         if width == 0 || height == 0 || stored == 0 {
-            let found = format!("{width} x {height} pixels of {stored} channels");
+            let found = format!("{width} x {height} pixels of {}", counted(stored, "channel"));
             return Err(Error::malformed(found, "at least 1 x 1 pixels of 1 channel").at(at));
         }
         let pixels = width.saturating_mul(height);
@@ -32,13 +33,14 @@ impl Size {
             (bytes, limits.max_decoded_bytes, "bytes", "max_decoded_bytes"),
         ] {
             if claimed > most {
-                let found = format!("{width} x {height} pixels of {stored} channels, {claimed} {unit}");
+                let found =
+                    format!("{width} x {height} pixels of {}, {claimed} {unit}", counted(stored, "channel"));
                 let expected = format!("at most {most} {unit} ({name})");
                 return Err(Error::new(ErrorKind::Limit, found, expected).at(at));
             }
         }
         let too_large = || {
-            let found = format!("{width} x {height} pixels of {stored} channels");
+            let found = format!("{width} x {height} pixels of {}", counted(stored, "channel"));
             Error::new(ErrorKind::Limit, found, "a size that this machine can address").at(at)
         };
         let (Ok(width), Ok(height), Ok(channels), Ok(_)) =

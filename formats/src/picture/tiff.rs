@@ -14,6 +14,7 @@ mod decompress;
 mod directory;
 mod layout;
 mod pixels;
+mod remarks;
 mod stack;
 
 use super::{Picture, PictureHeader};
@@ -64,6 +65,6 @@ fn of_layout(layout: &Layout) -> PictureHeader {
         scanlines_are_columns: false,
         orientation: layout.orientation,
         profile: layout.profile.clone(),
-        remarks: Vec::new(),
+        remarks: layout.remarks.clone(),
     }
 }

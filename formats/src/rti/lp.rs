@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use crate::file_name::{inside_folder, parts_of, repeated};
 use crate::text::utf8;
+use crate::words::counted;
 use crate::{Angles, Error, ErrorKind, Limits, Result};
 
 /// The lights of a fixed view, in the list's order.
@@ -60,7 +61,7 @@ pub fn read_lp(bytes: &[u8], limits: &Limits) -> Result<LightList> {
             continue;
         }
         if u64::try_from(lamps.len()).unwrap_or(u64::MAX) >= limits.max_directions {
-            let found = format!("more than {} lights", limits.max_directions);
+            let found = format!("more than {}", counted(limits.max_directions, "light"));
             return Err(Error::new(ErrorKind::Limit, found, "a list within the limit of directions"));
         }
         let lamp = lamp(text, number, &mut marks)?;
@@ -183,7 +184,9 @@ fn require_count(count: Option<&(String, usize)>, lights: usize, last: usize) ->
         None => Ok(Some(format!("the list does not begin with its number of lights; it has {lights}"))),
         Some((count, _)) if count.parse() == Ok(lights) => Ok(None),
         Some((count, line)) => Err(Error::malformed(
-            format!("line {line} says that there are {count} lights, up to line {last} there are {lights}"),
+            format!(
+                "line {line} gives {count} as the number of lights, up to line {last} there are {lights}"
+            ),
             "as many; the list is cut or put together of others, or else mend its count",
         )),
     }
@@ -233,13 +236,13 @@ mod tests {
         assert!(list("\u{feff}2\na.png 0 0 1\nb.png 0 1 1").warnings.is_empty());
         assert!(list("\n 002 \na.png 0 0 1\nb.png 0 1 1").warnings.is_empty());
         for (text, words) in [
-            ("7\na.png 0 0 1\n", "line 1 says that there are 7 lights, up to line 2 there are 1"),
+            ("7\na.png 0 0 1\n", "line 1 gives 7 as the number of lights, up to line 2 there are 1"),
             (
                 "\n1\na.png 0 0 1\n\nb.png 0 1 1",
-                "line 2 says that there are 1 lights, up to line 5 there are 2",
+                "line 2 gives 1 as the number of lights, up to line 5 there are 2",
             ),
-            ("0\na.png 0 0 1\n", "are 0 lights"),
-            ("3\n0 0 1\n0 1 1\n", "are 3 lights"),
+            ("0\na.png 0 0 1\n", "gives 0 as the number"),
+            ("3\n0 0 1\n0 1 1\n", "gives 3 as the number"),
             ("99999999999999999999999\na.png 0 0 1\n", "there are 1"),
         ] {
             let error = read_lp(text.as_bytes(), &Limits::default()).unwrap_err();

@@ -1,9 +1,21 @@
 //! File names: reading the variants found in the wild, writing the published form.
 
 use super::Angles;
-use crate::fields::{NumberPrefix, Unit, digits_are_left};
+use crate::behind::{Digits, KNOWN_FORMS, Unit, unit_behind};
+use crate::fields::NumberPrefix;
 use crate::file_name::{base, picture_stem};
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
+
+/// The labels of the four angles.
+const KEYS: [[u8; 2]; 4] = [TL, PL, TV, PV];
+const TL: [u8; 2] = *b"tl";
+const PL: [u8; 2] = *b"pl";
+const TV: [u8; 2] = *b"tv";
+const PV: [u8; 2] = *b"pv";
+
+/// An angle and what follows it.
+type Number<'a> = (f64, &'a str);
 
 /// What the name of an image says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,8 +33,8 @@ pub struct ImageName {
 /// Only what follows the last `/` or `\` counts. It must end in a picture's extension (jpg, jpeg, png, tif,
 /// tiff, hdr, exr) and have each of `tl`, `pl`, `tv`, `pv` once, followed by an angle in degrees with or
 /// without decimals; theta in 0..=90, phi any (it may be negative). Case, order, separators, and whatever
-/// else the name holds, do not matter, but that no digits may be left right behind an angle (`tl7,5`, `tl7_5`): see
-/// [`half_read`]; and no unit other than degrees (`tl0.26rad`).
+/// else the name holds, do not matter, but for what stands right behind an angle (`tl7,5`, `tl7_5`): see
+/// [`expect_known`]; and no unit other than degrees (`tl0.26rad`).
 ///
 /// ```
 /// use btfkit_formats::ubo2003::{Angles, parse_name};
@@ -34,24 +46,33 @@ pub struct ImageName {
 /// assert_eq!(parse_name("readme.txt"), None);
 /// ```
 pub fn parse_name(path: &str) -> Option<ImageName> {
-    if half_read(path) {
-        return None;
-    }
     let stem = base(picture_stem(path)?);
     Some(ImageName {
         number: leading_number(stem),
-        light: Angles::new(angle(stem, *b"tl")?, angle(stem, *b"pl")?)?,
-        view: Angles::new(angle(stem, *b"tv")?, angle(stem, *b"pv")?)?,
+        light: Angles::new(angle(stem, TL)?, angle(stem, PL)?)?,
+        view: Angles::new(angle(stem, TV)?, angle(stem, PV)?)?,
     })
 }
 
-/// Whether a picture's name has the labels, but a number that would be read by half: `tl7,5`, `tl7p5`, `tl7-5`,
-/// `tl7_5`, `tl4.5e+01`. Such a name is no image, and a caller does well not to pass over it.
-pub fn half_read(path: &str) -> bool {
-    let Some(stem) = picture_stem(path).map(base) else { return false };
-    let labels = [*b"tl", *b"pl", *b"tv", *b"pv"];
-    let numbers: Option<Vec<(f64, &str)>> = labels.iter().map(|&key| angle_and_rest(stem, key)).collect();
-    numbers.is_some_and(|numbers| numbers.iter().any(|(_, rest)| digits_are_left(rest)))
+/// That no picture's name has the labels, but something behind an angle that is not known: `tl7,5`, `tl7p5`, `tl7_5`,
+/// `tl7point5`, `tl4.5e+01`, `tl5gon`. Such a name is no image, and a caller does well not to pass over it.
+///
+/// # Errors
+/// [`ErrorKind::Unsupported`]: the name, what was found, and the forms that are read.
+pub fn expect_known(path: &str) -> Result<()> {
+    let Some(stem) = picture_stem(path).map(base) else { return Ok(()) };
+    let numbers: Option<Vec<Number<'_>>> = KEYS.iter().map(|&key| angle_and_rest(stem, key)).collect();
+    let unread = numbers
+        .into_iter()
+        .flatten()
+        .find_map(|(value, rest)| unit_behind(rest, Digits::Doubted).err().map(|unknown| (value, unknown)));
+    match unread {
+        Some((value, unknown)) => {
+            let found = format!("the name {path:?} with {unknown:?} behind the angle {value}");
+            Err(Error::new(ErrorKind::Unsupported, found, KNOWN_FORMS))
+        }
+        None => Ok(()),
+    }
 }
 
 fn leading_number(stem: &str) -> Option<u32> {
@@ -62,11 +83,12 @@ fn leading_number(stem: &str) -> Option<u32> {
 /// The number after `key`, which must occur once. A key starts where no letter stands before it, so `atl5` has
 /// none.
 fn angle(stem: &str, key: [u8; 2]) -> Option<f64> {
-    angle_and_rest(stem, key).filter(|(_, rest)| Unit::of(rest) == Unit::Degrees).map(|(angle, _)| angle)
+    let (angle, rest) = angle_and_rest(stem, key)?;
+    unit_behind(rest, Digits::Doubted).is_ok_and(|unit| unit == Unit::Degrees).then_some(angle)
 }
 
 /// That number, and what follows it.
-fn angle_and_rest(stem: &str, key: [u8; 2]) -> Option<(f64, &str)> {
+fn angle_and_rest(stem: &str, key: [u8; 2]) -> Option<Number<'_>> {
     let bytes = stem.as_bytes();
     let is_key = |(_, pair): &(usize, &[u8])| pair.eq_ignore_ascii_case(&key);
     let starts_word = |(at, _): &(usize, &[u8])| {
@@ -125,7 +147,7 @@ pub fn write_name(
     };
     for angle in [light.theta_deg(), light.phi_deg(), view.theta_deg(), view.phi_deg()] {
         if angle.fract() != 0.0 {
-            return Err(argument(format!("an angle of {angle} degrees"), "whole degrees"));
+            return Err(argument(format!("an angle of {}", counted(angle, "degree")), "whole degrees"));
         }
     }
     let (tl, pl) = (light.theta_deg(), light.phi_deg());
@@ -201,6 +223,10 @@ mod tests {
             "tl0.26rad_pl1.57rad_tv0rad_pv0rad.jpg",
             "tl15_pl0_tv22_pv0.5rad.jpg",
             "tl15 gon pl0 tv22 pv0.jpg",
+            "tl4point5_pl0_tv22_pv90.jpg",
+            "tl4 .5_pl0_tv22_pv90.jpg",
+            "tl4_pl0_tv22_pv90x10.jpg",
+            "tl0.1rev pl0 tv22 pv90.jpg",
         ] {
             assert_eq!(parse_name(name), None, "{name:?}");
         }
@@ -213,13 +239,16 @@ mod tests {
             "tl7_pl0_tv22_pv90_5.png",
             "tl7 pl0 tv2 5 pv90.png",
             "tl7d5 pl0 tv2 pv90.png",
+            "tl7point5 pl0 tv2 pv90.png",
+            "tl7 pl0..5 tv2 pv90.png",
+            "tl7 pl0 tv2 pv0.5pi.png",
         ] {
-            assert!(half_read(name), "{name:?}");
+            assert!(expect_known(name).is_err(), "{name:?}");
         }
         for name in
             ["00000 tl007 pl000 tv022 pv090.jpg", "tl7.5_pl0_tv22_pv90 b.jpg", "tl7,5.jpg", "a5.jpg", "x"]
         {
-            assert!(!half_read(name), "{name:?}");
+            assert!(expect_known(name).is_ok(), "{name:?}");
         }
     }
 

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::ubo2003::Angles;
+use crate::words::counted;
 use crate::{Direction, Error, ErrorKind, Limits, Result, six_digits};
 
 /// Angles that differ by less than about half of this are one direction, degrees: above the rounding of a
@@ -85,7 +86,7 @@ impl Grid {
         let most = views.list.len().max(lights.list.len());
         if u64::try_from(most).is_ok_and(|most| most > limits.max_directions) {
             let expected = format!("at most {} (max_directions)", limits.max_directions);
-            return Err(Error::new(ErrorKind::Limit, format!("{most} directions"), expected));
+            return Err(Error::new(ErrorKind::Limit, counted(most, "direction"), expected));
         }
         let every =
             || (0..views.list.len()).flat_map(|view| (0..lights.list.len()).map(move |light| (view, light)));
@@ -98,13 +99,13 @@ impl Grid {
             let expected = views.list.len().saturating_mul(lights.list.len());
             return Err(Error::malformed(
                 format!(
-                    "{} images of {} views and {} lights, none of {}",
-                    pairs.len(),
-                    views.list.len(),
-                    lights.list.len(),
+                    "{} of {} and {}, none of {}",
+                    counted(pairs.len(), "image"),
+                    counted(views.list.len(), "view"),
+                    counted(lights.list.len(), "light"),
                     missing.join("; ")
                 ),
-                format!("one for each of {expected} pairs of directions"),
+                format!("one for each of {} of directions", counted(expected, "pair")),
             ));
         }
         let places = every().filter_map(|pair| found.get(&pair).copied()).collect();

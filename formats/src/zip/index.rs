@@ -9,6 +9,7 @@ use rawzip::extra_fields::ExtraFieldId;
 use rawzip::{CompressionMethod, ZipArchive, ZipFileHeaderRecord, ZipSliceArchive};
 
 use super::{cp437, crc32, name, translate};
+use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result};
 
 /// Deflate cannot expand one byte to more than 1032 (a match of 258 bytes in two bits).
@@ -104,7 +105,11 @@ impl ZipIndex {
             count = count.saturating_add(1);
             if count > limits.max_entries {
                 let expected = format!("at most {} (max_entries)", limits.max_entries);
-                return Err(Error::new(ErrorKind::Limit, format!("{count} zip entries or more"), expected));
+                return Err(Error::new(
+                    ErrorKind::Limit,
+                    format!("{} or more", counted(count, "zip entry")),
+                    expected,
+                ));
             }
             if !record.is_dir() {
                 let entry = read_entry(&archive, &record, limits)?;
@@ -115,7 +120,7 @@ impl ZipIndex {
         }
         if count != declared {
             return Err(Error::malformed(
-                format!("{count} entries in the directory"),
+                format!("{} in the directory", counted(count, "entry")),
                 format!("{declared}, as its end record says"),
             )
             .at(archive.eocd_offset()));
@@ -155,7 +160,7 @@ impl ZipEntry {
     fn read<'a>(&self, bytes: &'a [u8]) -> Result<Cow<'a, [u8]>> {
         let Some(compressed) = bytes.get(self.compressed_range()) else {
             return Err(Error::malformed(
-                format!("an archive of {} bytes", bytes.len()),
+                format!("an archive of {}", counted(bytes.len(), "byte")),
                 format!("at least {}, as when it was opened", self.compressed.end),
             ));
         };
@@ -176,7 +181,7 @@ impl ZipEntry {
 
     fn inflate(&self, compressed: &[u8]) -> Result<Vec<u8>> {
         let wrong = |found: String| {
-            let expected = format!("deflate data of exactly {} bytes", self.uncompressed_bytes);
+            let expected = format!("deflate data of exactly {}", counted(self.uncompressed_bytes, "byte"));
             Error::malformed(found, expected).at(self.compressed.start)
         };
         // One byte more than declared, so that a stream that goes on is seen to go on.
@@ -185,7 +190,7 @@ impl ZipEntry {
         if capacity.is_none_or(|capacity| data.try_reserve_exact(capacity).is_err()) {
             return Err(Error::new(
                 ErrorKind::Limit,
-                format!("an entry of {} bytes", self.uncompressed_bytes),
+                format!("an entry of {}", counted(self.uncompressed_bytes, "byte")),
                 "one that fits in memory",
             ));
         }
@@ -204,7 +209,10 @@ impl ZipEntry {
         }
         let consumed = inflater.total_in();
         if u64::try_from(compressed.len()).ok() != Some(consumed) {
-            return Err(wrong(format!("{} compressed bytes of which {consumed} are used", compressed.len())));
+            return Err(wrong(format!(
+                "{} of which {consumed} are used",
+                counted(compressed.len(), "compressed byte")
+            )));
         }
         Ok(data)
     }
@@ -273,7 +281,7 @@ fn check_entry(
     let compressed_bytes = record.compressed_size_hint();
     if uncompressed_bytes > limits.max_entry_bytes {
         let expected = format!("at most {} (max_entry_bytes)", limits.max_entry_bytes);
-        let found = format!("an entry of {uncompressed_bytes} bytes");
+        let found = format!("an entry of {}", counted(uncompressed_bytes, "byte"));
         return Err(Error::new(ErrorKind::Limit, found, expected));
     }
     let most = match method {
@@ -282,7 +290,10 @@ fn check_entry(
     };
     if uncompressed_bytes > most || (method == Method::Stored && uncompressed_bytes != compressed_bytes) {
         return Err(Error::malformed(
-            format!("{uncompressed_bytes} bytes declared for {compressed_bytes} of {method:?} data"),
+            format!(
+                "{} declared for {compressed_bytes} of {method:?} data",
+                counted(uncompressed_bytes, "byte")
+            ),
             format!("at most {most}, all that they can hold"),
         )
         .at(record.central_directory_offset()));

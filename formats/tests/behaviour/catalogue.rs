@@ -105,7 +105,7 @@ fn the_report_names_twenty_and_counts_the_rest() {
 fn no_image_at_all_is_an_error() {
     let errors = catalogue(&["readme.txt".into()]).unwrap_err();
     assert_eq!((errors.images, errors.ignored), (0, 1));
-    assert!(errors.to_string().contains("no image among 1 names"));
+    assert!(errors.to_string().contains("no image among 1 name,"));
     assert!(catalogue(&[]).is_err());
 }
 

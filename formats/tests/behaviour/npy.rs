@@ -234,5 +234,5 @@ fn nonsense_sizes_are_refused() {
         assert!(matches!(error.kind(), ErrorKind::Limit | ErrorKind::Malformed), "{shape:?}: {error}");
     }
     let axes = directions_file(&directions_of(3));
-    assert!(open(&axes).unwrap_err().to_string().contains("2 axes"));
+    assert!(open(&axes).unwrap_err().to_string().contains("2 dimensions"));
 }

@@ -1,7 +1,7 @@
 //! Pictures cut, bent and lying about themselves.
 
 use btfkit_formats::picture::{check, decode, header};
-use btfkit_formats::{ErrorKind, Limits, Samples};
+use btfkit_formats::{Angles, Catalogue, ErrorKind, Limits, Pair, Samples, table};
 
 use crate::picture_files::{
     HdrCoding, Png, RGBE, Tiff, all, exr_by_crate, exr_picture, hdr_of, png_chunk, png_ihdr, png_of, pngs,
@@ -392,4 +392,36 @@ fn refuse_only_when_decoded(bytes: &[u8], words: &str) {
     let error = decode(bytes, &Limits::default()).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Malformed);
     assert!(error.to_string().contains(words), "{error}");
+}
+
+#[test]
+fn one_of_a_thing_is_singular_in_every_message() {
+    let wrong = |text: &str| {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let is_plural =
+            |word: &str| word.trim_end_matches(|c: char| !c.is_alphabetic()).ends_with('s') && word != "is";
+        words.windows(2).any(|pair| pair[0] == "1" && is_plural(pair[1]))
+    };
+    assert!(wrong("found 1 bytes, expected 2") && !wrong("found 1 byte, expected 11 bytes"));
+    for (name, bytes) in all() {
+        for end in 0..bytes.len() {
+            if let Err(error) = check(&bytes[..end], &Limits::default()) {
+                assert!(!wrong(&error.to_string()), "{name} cut to {end}: {error}");
+            }
+        }
+        for more in 1..3 {
+            if let Err(error) = check(&[&bytes[..], &vec![1; more]].concat(), &Limits::default()) {
+                assert!(!wrong(&error.to_string()), "{name} with {more} more: {error}");
+            }
+        }
+    }
+    let pair = |theta| Pair { view: Angles::FRONTAL, light: Angles::new(theta, 0.0).unwrap() };
+    for files in [vec![("a", None)], vec![("a", Some(pair(1.0))), ("b", Some(pair(1.0)))]] {
+        let error = Catalogue::from_pairs(files).unwrap_err().to_string();
+        assert!(!wrong(&error), "{error}");
+    }
+    for text in ["file,theta_i,phi_i\na,1\n", "file\n", "file,theta_i,phi_i\na,1,2,3\n"] {
+        let error = table::read(text.as_bytes(), &Limits::default()).unwrap_err().to_string();
+        assert!(!wrong(&error), "{error}");
+    }
 }

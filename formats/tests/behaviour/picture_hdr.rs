@@ -73,6 +73,53 @@ fn exposures_and_colour_corrections_are_undone() {
 }
 
 #[test]
+fn variables_are_read_in_any_case_and_spacing_or_refused() {
+    let pixels = rgbe(16);
+    let with = |line: &str| {
+        let bytes = hdr_of(&format!("{RGBE}{line}\n"), "-Y 2 +X 8", &pixels, 8, HdrCoding::Flat);
+        decode(&bytes, &Limits::default())
+    };
+    let halved: Vec<f32> = values(&pixels).iter().map(|value| value / 2.0).collect();
+    for line in [
+        "EXPOSURE=2",
+        "EXPOSURE = 2",
+        "exposure=2",
+        "EXPOSURE= 2",
+        " Exposure =2 ",
+        "EXPOSURE\t=2",
+        "ColorCorr = 2 2 2",
+    ] {
+        assert_eq!(floats(&with(line).unwrap()), halved, "{line:?}");
+    }
+    // What a picture was made of, comments and commands.
+    for line in [
+        "\tEXPOSURE=2",
+        "# EXPOSURE=2",
+        "pfilt -e 2",
+        "gamma=1",
+        "GAMMA = 1.0",
+        "exposure by hand",
+        "VIEW= -vf 2",
+    ] {
+        assert_eq!(floats(&with(line).unwrap()), values(&pixels), "{line:?}");
+    }
+    for line in [
+        "gamma=2.2",
+        "Gamma = 2.2",
+        "GAMMA 2.2",
+        "EXPOSURE 2",
+        "exposure: 2",
+        "COLORCORR 1 2 3",
+        "pixaspect=0",
+    ] {
+        let error = with(line).unwrap_err().to_string();
+        assert!(error.contains(line.split([' ', '=', ':']).next().unwrap()), "{line:?}: {error}");
+    }
+    let one = with("EXPOSURE = x").unwrap_err().to_string();
+    assert!(one.contains("expected a positive number"), "{one}");
+}
+
+#[test]
 fn xyz_keeps_its_channels() {
     let bytes = hdr_of("FORMAT=32-bit_rle_xyze\n", "-Y 2 +X 8", &rgbe(16), 8, HdrCoding::Components);
     assert_eq!(read(&bytes).channels, ["X", "Y", "Z"]);

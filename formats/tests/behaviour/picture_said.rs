@@ -81,6 +81,132 @@ fn exif_of_colours(space: u8) -> Vec<u8> {
     [&first[..], b"\0\x01\xA0\x01\0\x03\0\0\0\x01", &[space, space, 0, 0], &[0; 4]].concat()
 }
 
+/// An OpenEXR picture with attributes: name, type, value.
+fn exr(attributes: &[(&str, &str, &[u8])]) -> Vec<u8> {
+    let plain = crate::picture_files::exr_with_attributes(["R", "G", "B"], None, None);
+    let one = |(name, kind, value): &(&str, &str, &[u8])| {
+        let len = (value.len() as u32).to_le_bytes();
+        [name.as_bytes(), b"\0", kind.as_bytes(), b"\0", &len, value].concat()
+    };
+    let more: Vec<u8> = attributes.iter().flat_map(one).collect();
+    // The offset of the only chunk, which follows it.
+    let is_table = |at: &usize| plain[*at..*at + 8] == (*at as u64 + 8).to_le_bytes();
+    let table = (8..plain.len() - 8).find(is_table).unwrap();
+    let offset = (table + 8 + more.len()) as u64;
+    // What an attribute says that is there already is said anew.
+    let mut head = plain[8..table].to_vec();
+    for (name, _, value) in attributes {
+        if let Some(at) = memchr::memmem::find(&head, format!("{name}\0").as_bytes()) {
+            let start = at + name.len() + 1 + "float\0".len() + 4;
+            head[start..start + value.len()].copy_from_slice(value);
+            return [&plain[..8], &head, &plain[table..]].concat();
+        }
+    }
+    [&plain[..8], &more, &head, &offset.to_le_bytes(), &plain[table + 8..]].concat()
+}
+
+#[test]
+fn pixels_that_are_not_square_are_told_by_every_format() {
+    use crate::picture_files::{HdrCoding, RGBE, hdr_of, rgbe};
+    let phys = |x: u32, y: u32| png_chunk(b"pHYs", &[&x.to_be_bytes()[..], &y.to_be_bytes(), &[1]].concat());
+    let jfif = |x: u16, y: u16| {
+        segment(0xE0, &[&b"JFIF\0\x01\x02\x01"[..], &x.to_be_bytes(), &y.to_be_bytes(), &[0, 0]].concat())
+    };
+    let hdr = |line: &str| hdr_of(&format!("{RGBE}{line}"), "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat);
+    for (bytes, place) in [
+        (png(&[phys(100, 200)]), "pHYs"),
+        (png(&[png_chunk(b"sCAL", b"\x012.0\01e0")]), "sCAL"),
+        (jpeg(&[jfif(36, 72)]), "JFIF"),
+        (tiff(&[(282, vec![50]), (283, vec![100])]), "resolutions"),
+        (tiff(&[(33550, vec![2, 1, 0])]), "ModelPixelScale"),
+        (exr(&[("pixelAspectRatio", "float", &2f32.to_le_bytes())]), "pixelAspectRatio"),
+        (hdr("PIXASPECT=0.5\n"), "PIXASPECT"),
+        (hdr("pixaspect = 0.25\nPIXASPECT=2\n"), "PIXASPECT"),
+    ] {
+        let [told] = said(&bytes).remarks.try_into().unwrap();
+        assert!(told.contains("2.0000 times as wide as high") && told.contains(place), "{told}");
+    }
+    for bytes in [
+        png(&[phys(100, 100)]),
+        png(&[phys(0, 1)]),
+        jpeg(&[jfif(72, 72)]),
+        jpeg(&[jfif(0, 0)]),
+        tiff(&[(282, vec![72]), (283, vec![72])]),
+        exr(&[("pixelAspectRatio", "float", &1f32.to_le_bytes())]),
+        hdr("PIXASPECT=1\n"),
+    ] {
+        assert!(said(&bytes).remarks.is_empty());
+    }
+}
+
+#[test]
+fn what_pictures_say_of_their_colours_by_name_is_told() {
+    let text = |key: &str, value: &str| png(&[png_chunk(b"tEXt", format!("{key}\0{value}").as_bytes())]);
+    let xmp = |packet: &str| {
+        jpeg(&[segment(0xE1, &[b"http://ns.adobe.com/xap/1.0/\0", packet.as_bytes()].concat())])
+    };
+    for (bytes, told) in [
+        (exr(&[("oiio:ColorSpace", "string", b"sRGB")]), Some("the colour space \"sRGB\"")),
+        (exr(&[("colorInteropID", "string", b"lin_ap1_scene")]), Some("the colour space \"lin_ap1_scene\"")),
+        (exr(&[("oiio:ColorSpace", "string", b"lin_rec709")]), None),
+        (exr(&[("oiio:ColorSpace", "string", b"Linear")]), None),
+        (exr(&[("oiio:ColorSpace", "int", &[0; 4])]), None),
+        (text("oiio:ColorSpace", "lin_rec709"), Some("the colour space \"lin_rec709\"")),
+        (text("oiio:ColorSpace", "sRGB"), None),
+        (
+            png(&[png_chunk(b"pCAL", b"albedo\0\0\0\0\0")]),
+            Some("a calibration of sample values \"albedo\" (pCAL)"),
+        ),
+        (
+            xmp("<x photoshop:ICCProfile=\"Adobe RGB (1998)\"/>"),
+            Some("the ICC profile \"Adobe RGB (1998)\" (XMP)"),
+        ),
+        (
+            xmp("<x xmlns:e=\"http://ns.adobe.com/exif/1.0/\" e:ColorSpace=\"2\"/>"),
+            Some("the Exif colour space 2 (Adobe RGB)"),
+        ),
+        (xmp("<x photoshop:ICCProfile=\"sRGB IEC61966-2.1\" exif:ColorSpace=\"1\"/>"), None),
+    ] {
+        assert_eq!(said(&bytes).profile.as_deref(), told);
+    }
+    let white = exr(&[("whiteLuminance", "float", &80f32.to_le_bytes())]);
+    assert!(said(&white).remarks[0].contains("a white of 80 cd/m2 (whiteLuminance) is not applied"));
+    assert!(said(&exr(&[("whiteLuminance", "float", &1f32.to_le_bytes())])).remarks.is_empty());
+}
+
+#[test]
+fn crops_and_scales_of_a_tiff_are_told() {
+    let gdal = |text: &str| {
+        let mut text = text.as_bytes().to_vec();
+        text.resize(text.len().next_multiple_of(4), 0);
+        words(&text)
+    };
+    let item = |role: &str, value: &str| {
+        format!("<GDALMetadata><Item name=\"X\" sample='0' role='{role}'>{value}</Item>")
+    };
+    for (tag, values, told) in [
+        (50719, vec![1, 0], "the crop's origin [1.0, 0.0] (DNG)"),
+        (50720, vec![3, 4], "the crop's size [3.0, 4.0] (DNG)"),
+        (50829, vec![0, 0, 4, 3], "the active area [0.0, 0.0, 4.0, 3.0] (DNG)"),
+        (42113, gdal("-9999"), "samples of \"-9999\" are no data"),
+        (42112, gdal(&item("scale", "0.1")), "the scale and the offset"),
+        (42112, gdal(&item("offset", "5")), "the scale and the offset"),
+    ] {
+        let [found] = said(&tiff(&[(tag, values)])).remarks.try_into().unwrap();
+        assert!(found.contains(told), "{found}");
+    }
+    for (tag, values) in [
+        (50719, vec![0, 0]),
+        (50720, vec![4, 4]),
+        (50829, vec![0, 0, 4, 4]),
+        (42112, gdal(&item("scale", "1"))),
+        (42112, gdal(&item("offset", "0.0"))),
+        (42112, gdal("<Item name=\"AREA\">7</Item>")),
+    ] {
+        assert!(said(&tiff(&[(tag, values)])).remarks.is_empty(), "{tag}");
+    }
+}
+
 #[test]
 fn profiles_other_than_srgb_are_told() {
     for version in [2, 4] {
@@ -158,6 +284,8 @@ fn a_turn_is_told_wherever_it_stands() {
     let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0";
     let attribute = b"<rdf:Description tiff:Orientation=\"6\" x=\"1\"/>";
     let element = b"<tiff:Orientation>\n 6 </tiff:Orientation>";
+    let renamed =
+        b"<x xmlns:a = 'http://ns.adobe.com/tiff/1.0/'><a:Orientation q:t=\"u\">6</a:Orientation></x>";
     let raw = |kind: &str, data: &[u8]| {
         let digits: String = data.iter().map(|byte| format!("{byte:02x}")).collect();
         format!("\n{kind}\n {:8}\n{}\n{}\n", data.len(), &digits[..10], &digits[10..])
@@ -169,14 +297,21 @@ fn a_turn_is_told_wherever_it_stands() {
         png_chunk(b"iTXt", &[&b"XML:com.adobe.xmp\0"[..], &[u8::from(packed), 0], b"en\0\0", &text].concat())
     };
     let named = |key: &str, text: &[u8]| [format!("Raw profile type {key}\0").as_bytes(), text].concat();
-    let mut all = vec![tiff(&[(700, words(attribute))]), tiff(&[(274, vec![6])])];
+    let mut all = vec![
+        tiff(&[(700, words(attribute))]),
+        tiff(&[(274, vec![6])]),
+        tiff(&[(700, words(renamed))]),
+        exr(&[("Orientation", "int", &6i32.to_le_bytes())]),
+    ];
     all.extend(
-        [&attribute[..], element]
+        [&attribute[..], element, renamed]
             .map(|packet| jpeg(&[segment(0xE1, &[b"http://ns.adobe.com/xap/1.0/\0", packet].concat())])),
     );
     all.extend(
         [
             png_chunk(b"eXIf", exif),
+            png_chunk(b"eXIf", &[b"Exif\0\0", &exif[..]].concat()),
+            itxt(true, renamed),
             itxt(false, attribute),
             itxt(true, element),
             png_chunk(b"tEXt", &named("exif", app1.as_bytes())),
@@ -189,14 +324,21 @@ fn a_turn_is_told_wherever_it_stands() {
     for (number, bytes) in all.iter().enumerate() {
         assert_eq!(said(bytes).orientation, 6, "{number}");
     }
-    for text in
-        [&b""[..], b"tiff:Orientation", b"tiff:Orientation=\"\"", b"tiff:Orientation=\"9\"", b"Orientation=6"]
-    {
+    for text in [
+        &b"<x a:Orientation=\"6\"/>"[..],
+        b"<x xmlns:a='http://ns.other/' a:Orientation=\"6\"/>",
+        b"",
+        b"tiff:Orientation",
+        b"tiff:Orientation=\"\"",
+        b"tiff:Orientation=\"9\"",
+        b"Orientation=6",
+    ] {
         assert_eq!(said(&png(&[itxt(false, text)])).orientation, 1);
         assert_eq!(said(&tiff(&[(700, words(text))])).orientation, 1);
     }
     assert_eq!(said(&png(&[png_chunk(b"tEXt", b"Comment\0tiff:Orientation=\"6\"")])).orientation, 1);
     assert_eq!(samples(&all[0]), samples(&tiff(&[])));
+    assert_eq!(samples(&all[3]), samples(&exr(&[])));
 }
 
 #[test]

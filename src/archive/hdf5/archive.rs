@@ -12,6 +12,7 @@ use super::image_list::{self, ImageList};
 use super::measurement::{self, Texels};
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
+use crate::words::counted;
 
 /// An HDF5 archive, listed but with no samples read. Can be read from several threads; the C library serves one at a
 /// time.
@@ -57,8 +58,10 @@ impl Archive {
         let pixels = u64::from(contents.width) * u64::from(contents.height);
         if pixels > limits.max_pixels_per_image {
             return Err(file.error(format!(
-                "got images of {}x{}, expected at most {} pixels",
-                contents.width, contents.height, limits.max_pixels_per_image
+                "got images of {}x{}, expected at most {}",
+                contents.width,
+                contents.height,
+                counted(limits.max_pixels_per_image, "pixel")
             )));
         }
         Ok(Self { path: path.to_owned(), limits: limits.clone(), layout, contents })
@@ -107,10 +110,10 @@ impl Archive {
         let inside = view < views.len() && lights.end <= all.len() && window.fits(self.size());
         if !inside {
             return Err(Error::usage(format!(
-                "{}: asked for view {view}, lights {lights:?}, window {window} of {} views, {} lights, {}",
+                "{}: asked for view {view}, lights {lights:?}, window {window} of {}, {}, {}",
                 self.path.display(),
-                views.len(),
-                all.len(),
+                counted(views.len(), "view"),
+                counted(all.len(), "light"),
                 self.size()
             )));
         }
@@ -118,8 +121,9 @@ impl Archive {
         let bytes = (window.size.texels() as u64).saturating_mul(texel_bytes as u64);
         if bytes > self.limits.max_decoded_bytes {
             return Err(Error::usage(format!(
-                "{}: asked for {bytes} bytes at once, expected at most {}",
+                "{}: asked for {} at once, expected at most {}",
                 self.path.display(),
+                counted(bytes, "byte"),
                 self.limits.max_decoded_bytes
             )));
         }

@@ -8,6 +8,7 @@ use hdf5::{Attribute, Location};
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::words::counted;
 
 /// Longest text of one attribute, bytes: HDF5 keeps small attributes in a header of at most 64 KiB.
 pub(super) const MAX_TEXT_BYTES: usize = 60_000;
@@ -115,8 +116,11 @@ impl<'a> Attributes<'a> {
     }
 
     fn no_text(&self, name: &str, kind: &TypeDescriptor, limit: usize) -> Error {
-        self.error(name, format!("got the type {kind}, expected text of a fixed length up to {limit} bytes"))
-            .hint("in h5py: attrs[name] = numpy.bytes_(text.encode())")
+        self.error(
+            name,
+            format!("got the type {kind}, expected text of a fixed length up to {}", counted(limit, "byte")),
+        )
+        .hint("in h5py: attrs[name] = numpy.bytes_(text.encode())")
     }
 }
 
@@ -137,8 +141,8 @@ pub(super) fn write(location: &Location, name: &str, value: &Value) -> std::resu
 fn write_text(location: &Location, name: &str, text: &str) -> std::result::Result<(), hdf5::Error> {
     let held: FixedUnicode<MAX_TEXT_BYTES> = text.parse().map_err(|_| {
         hdf5::Error::from(format!(
-            "attribute {name} has {} bytes, expected at most {MAX_TEXT_BYTES}",
-            text.len()
+            "attribute {name} has {}, expected at most {MAX_TEXT_BYTES}",
+            counted(text.len(), "byte")
         ))
     })?;
     let kind = TypeDescriptor::FixedUnicode(text.len().max(1));

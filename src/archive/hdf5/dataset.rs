@@ -17,6 +17,7 @@ use hdf5::{
 use ndarray::IxDyn;
 
 use crate::error::{Error, Result};
+use crate::words::counted;
 
 /// Links of the root group that are looked at.
 const MAX_LINKS: usize = 4096;
@@ -120,7 +121,7 @@ impl File {
                 table.expect_stored(bytes, self.bytes)?;
                 let end = table.dataset.offset().and_then(|start| start.checked_add(bytes));
                 if end.is_none_or(|end| end > self.bytes) {
-                    return Err(wrong(format!("{bytes} bytes of data reach beyond the file")));
+                    return Err(wrong(format!("{} of data reach beyond the file", counted(bytes, "byte"))));
                 }
             }
             Layout::Chunked => {
@@ -244,7 +245,8 @@ impl Table {
             return Ok(());
         }
         Err(self.error(format!(
-            "got {stored} bytes of data in a file of {file_bytes}, expected {bytes} for the shape {:?}",
+            "got {} of data in a file of {file_bytes}, expected {bytes} for the shape {:?}",
+            counted(stored, "byte"),
             self.shape
         )))
     }
@@ -258,26 +260,39 @@ impl Table {
         }
         let chunk_bytes = chunk.iter().try_fold(self.kind.size() as u64, |n, &c| n.checked_mul(c as u64));
         let chunk_bytes = chunk_bytes.filter(|&bytes| bytes <= limits.max_entry_bytes).ok_or_else(|| {
-            wrong(format!("got chunks {chunk:?}, expected at most {} bytes each", limits.max_entry_bytes))
+            wrong(format!(
+                "got chunks {chunk:?}, expected at most {} each",
+                counted(limits.max_entry_bytes, "byte")
+            ))
         })?;
         let count = self.shape.iter().zip(chunk).map(|(&extent, &c)| extent.div_ceil(c) as u64);
         // Counting asks the library to walk through all of them: not for more than a file can hold.
         let count = count.fold(1u64, u64::saturating_mul);
         if count > file_bytes {
-            return Err(wrong(format!("got {count} chunks in a file of {file_bytes} bytes")));
+            return Err(wrong(format!(
+                "got {} in a file of {}",
+                counted(count, "chunk"),
+                counted(file_bytes, "byte")
+            )));
         }
         let found =
             self.dataset.num_chunks().ok_or_else(|| wrong("its chunks cannot be counted".to_owned()))?;
         if found as u64 != count {
             return Err(wrong(format!(
-                "got {found} chunks, expected {count} for the shape {:?}",
+                "got {}, expected {count} for the shape {:?}",
+                counted(found, "chunk"),
                 self.shape
             )));
         }
         let stored = self.dataset.storage_size();
         let honest = count.saturating_mul(chunk_bytes + chunk_bytes / 100 + CHUNK_OVERHEAD_BYTES);
         if stored > honest.min(file_bytes) {
-            return Err(wrong(format!("got {stored} bytes in {count} chunks of {chunk_bytes} bytes each")));
+            return Err(wrong(format!(
+                "got {} in {} of {} each",
+                counted(stored, "byte"),
+                counted(count, "chunk"),
+                counted(chunk_bytes, "byte")
+            )));
         }
         Ok(())
     }

@@ -37,11 +37,13 @@ impl Grid {
         let (missing, repeated) = (pairs - image_of.len(), count - image_of.len());
         if missing + repeated > 0 {
             return Err(format!(
-                "got {} of {} and {}: of {pairs} pairs {missing} are missing, and {repeated} images repeat a pair; \
+                "got {} of {} and {}: of {} {missing} missing, and {} of a pair that another has; \
                  expected one image of every pair",
                 counted(count, "image"),
                 counted(views.len(), "view"),
-                counted(lights.len(), "light")
+                counted(lights.len(), "light"),
+                counted(pairs, "pair"),
+                counted(repeated, "image")
             ));
         }
         let every = (0..views.len()).flat_map(|view| (0..lights.len()).map(move |light| (view, light)));

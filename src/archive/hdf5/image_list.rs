@@ -8,6 +8,7 @@ use hdf5::H5Type;
 use super::dataset::{File, Table, side};
 use super::grid::Grid;
 use crate::error::{Error, Result};
+use crate::words::counted;
 
 /// The samples, [image, y, x, channel].
 pub(super) const COLOR: &str = "ground_color";
@@ -31,7 +32,7 @@ impl ImageList {
             ("channel", limits.max_channels),
         ])?;
         if channels != 3 {
-            return Err(color.error(format!("got {channels} channels, expected R, G, B")));
+            return Err(color.error(format!("got {}, expected R, G, B", counted(channels, "channel"))));
         }
         if color.sample_type()? != SampleType::F32 {
             return Err(color.error("expected samples of type float32"));
@@ -40,7 +41,7 @@ impl ImageList {
         let lights = read_directions(file, LIGHT, count, limits)?;
         let grid = Grid::of(&views, &lights, limits).map_err(|what| file.error(what))?;
         let contents = Contents {
-            format: format!("HDF5, list of {count} images"),
+            format: format!("HDF5, list of {}", counted(count, "image")),
             width: side(width, &color)?,
             height: side(height, &color)?,
             channels: ["R", "G", "B"].map(str::to_owned).to_vec(),

@@ -10,6 +10,7 @@ use super::attribute::Attributes;
 use super::dataset::{File, Table, side};
 use crate::error::Result;
 use crate::store::measurement::KIND;
+use crate::words::counted;
 
 /// The samples, [view, y, x, light, channel].
 pub(super) const REFLECTANCE: &str = "reflectance";
@@ -69,7 +70,9 @@ impl Texels {
             Attributes::of(reflectance.location(), format!("{}: {REFLECTANCE}", file.path().display()))
                 .texts("channels")?;
         if names.len() != channels {
-            return Err(reflectance.error(format!("got {channels} channels and the names {names:?}")));
+            return Err(
+                reflectance.error(format!("got {} and the names {names:?}", counted(channels, "channel")))
+            );
         }
         let mut remarks = Vec::new();
         for name in root.names()?.into_iter().filter(|name| !TOLD.contains(&name.as_str())) {

@@ -15,6 +15,7 @@ use crate::disk::temporary::Temporary;
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::Existing;
 use crate::store::measurement::KIND;
+use crate::words::counted;
 
 /// Side of a chunk in texels.
 const CHUNK_SIDE: usize = 16;
@@ -182,11 +183,11 @@ impl Writer {
         let fits = view < self.shape[0] && list.len() == shape.iter().product::<usize>();
         if !fits || !dataset.dtype().is_ok_and(|kind| kind.is::<T>()) {
             return Err(Error::internal(format!(
-                "{}: got {} samples of {} bytes for view {view}, expected {shape:?} for one of {} views",
+                "{}: got {} of {} for view {view}, expected {shape:?} for one of {}",
                 self.path.display(),
-                list.len(),
-                size_of::<T>(),
-                self.shape[0]
+                counted(list.len(), "sample"),
+                counted(size_of::<T>(), "byte"),
+                counted(self.shape[0], "view")
             )));
         }
         let whole = shape.iter().map(|&extent| 0..extent);
@@ -209,9 +210,9 @@ impl Writer {
         let views = self.shape[0];
         if counts[0] != views || (counts[1] != 0 && counts[1] != views) {
             return Err(Error::internal(format!(
-                "{}: got samples of {} views and L* codes of {}, expected {views}",
+                "{}: got samples of {} and L* codes of {}, expected {views}",
                 self.path.display(),
-                counts[0],
+                counted(counts[0], "view"),
                 counts[1]
             )));
         }

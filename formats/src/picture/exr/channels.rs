@@ -5,6 +5,7 @@ use exr::meta::attribute::SampleType as Stored;
 use crate::picture::size::unsupported;
 use crate::picture::wavelength::{quantity, wavelength_nm};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result, SampleType};
 
 #[derive(Debug, Clone)]
@@ -86,7 +87,7 @@ impl Channels {
         give_roles(&mut within)?;
         let order = order_of(&stored);
         if order.is_empty() {
-            return Err(unsupported(format!("{} channels", stored.len()), "a channel that is not alpha"));
+            return Err(unsupported(counted(stored.len(), "channel"), "a channel that is not alpha"));
         }
         Ok(Channels { stored, order, layer })
     }

@@ -6,6 +6,7 @@ use exr::compression::Compression;
 
 use super::header::Header;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// A rectangle of pixels and where its data are.
@@ -33,8 +34,10 @@ pub(super) fn find(bytes: &[u8], header: &Header) -> Result<Vec<Chunk>> {
     let count = header.chunk_count();
     let left = table.rest().len();
     if count.saturating_mul(8) > u64::try_from(left).unwrap_or(u64::MAX) {
-        let found = format!("{left} bytes after the header");
-        return Err(Error::malformed(found, format!("a table of {count} offsets")).at(header.end));
+        let found = format!("{} after the header", counted(left, "byte"));
+        return Err(
+            Error::malformed(found, format!("a table of {}", counted(count, "offset"))).at(header.end)
+        );
     }
     let (across, down) = header.chunk_grid();
     let mut chunks = Vec::new();
@@ -79,9 +82,12 @@ fn read(reader: &mut Reader<'_>, (column, row): (u32, u32), header: &Header) -> 
     let claimed = u64::try_from(len).unwrap_or(0);
     // Data that do not shrink are stored as they are.
     if claimed == 0 || claimed > decoded || claimed.saturating_mul(expansion(header.compression)) < decoded {
-        let expected =
-            format!("a length from which {decoded} bytes of pixels can come ({})", header.compression);
-        return Err(Error::malformed(format!("a chunk of {len} bytes"), expected).at(at));
+        let expected = format!(
+            "a length from which {} of pixels can come ({})",
+            counted(decoded, "byte"),
+            header.compression
+        );
+        return Err(Error::malformed(format!("a chunk of {}", counted(len, "byte")), expected).at(at));
     }
     reader.take(usize::try_from(len).unwrap_or(usize::MAX))?;
     chunk.data.end = reader.position();

@@ -3,9 +3,11 @@
 use exr::compression::Compression;
 
 use super::channels::{Channels, text};
-use crate::picture::profile::of_chromaticities;
+use crate::picture::aspect;
+use crate::picture::profile::{of_chromaticities, of_space_name};
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result};
 
 /// The first four bytes of every OpenEXR file.
@@ -30,6 +32,10 @@ pub(super) struct Header {
     pub(super) profile: Option<String>,
     /// The data window where the display window is another: left, top, right, bottom of both.
     pub(super) windows: Option<[[i32; 4]; 2]>,
+    /// As in other formats: 1..=8.
+    pub(super) orientation: u8,
+    /// What else is not applied, a sentence each.
+    pub(super) not_applied: Vec<String>,
 }
 
 /// The attributes that say where pixels are and what they mean; each may be there once.
@@ -43,6 +49,11 @@ struct Attributes<'a> {
     tiles: Option<&'a [u8]>,
     kind: Option<&'a [u8]>,
     chunk_count: Option<&'a [u8]>,
+    pixel_aspect: Option<&'a [u8]>,
+    white_luminance: Option<&'a [u8]>,
+    orientation: Option<&'a [u8]>,
+    space: Option<&'a [u8]>,
+    interop: Option<&'a [u8]>,
 }
 
 impl<'a> Attributes<'a> {
@@ -57,9 +68,11 @@ impl<'a> Attributes<'a> {
             let kind = text(reader)?;
             let len = reader.i32_le()?;
             let Ok(len) = usize::try_from(len) else {
-                return Err(
-                    Error::malformed(format!("{len} bytes of the attribute {name:?}"), "at least 0").at(at)
-                );
+                return Err(Error::malformed(
+                    format!("{} of the attribute {name:?}", counted(len, "byte")),
+                    "at least 0",
+                )
+                .at(at));
             };
             let data = reader.take(len)?;
             let (slot, wanted) = match name.as_str() {
@@ -71,6 +84,11 @@ impl<'a> Attributes<'a> {
                 "tiles" => (&mut attributes.tiles, "tiledesc"),
                 "type" => (&mut attributes.kind, "string"),
                 "chunkCount" => (&mut attributes.chunk_count, "int"),
+                "pixelAspectRatio" => (&mut attributes.pixel_aspect, "float"),
+                "whiteLuminance" => (&mut attributes.white_luminance, "float"),
+                "Orientation" if kind == "int" => (&mut attributes.orientation, "int"),
+                "oiio:ColorSpace" if kind == "string" => (&mut attributes.space, "string"),
+                "colorInteropID" if kind == "string" => (&mut attributes.interop, "string"),
                 _ => continue,
             };
             if kind != wanted || slot.is_some() {
@@ -79,6 +97,20 @@ impl<'a> Attributes<'a> {
             }
             *slot = Some(data);
         }
+    }
+}
+
+impl Attributes<'_> {
+    /// What changes the meaning of pixels and samples and is not applied, a sentence each.
+    fn not_applied(&self) -> Vec<String> {
+        let number = |data: Option<&[u8]>| Some(f64::from(f32::from_le_bytes(data?.try_into().ok()?)));
+        let aspect = number(self.pixel_aspect).and_then(|ratio| aspect::remark(ratio, "pixelAspectRatio"));
+        let white = number(self.white_luminance).filter(|&white| white != 1.0).map(|white| {
+            format!(
+                "a white of {white} cd/m2 (whiteLuminance) is not applied: samples are taken as reflectance"
+            )
+        });
+        aspect.into_iter().chain(white).collect()
     }
 }
 
@@ -127,18 +159,35 @@ impl Header {
         }
         let coloured =
             ["R", "G", "B"].iter().all(|colour| channels.names().iter().any(|name| name == colour));
-        let profile = attributes.chromaticities.filter(|_| coloured).and_then(|data| {
+        let primaries = attributes.chromaticities.filter(|_| coloured).and_then(|data| {
             let values = data.as_chunks::<4>().0.iter().map(|&bytes| f64::from(f32::from_le_bytes(bytes)));
             of_chromaticities(&values.collect::<Vec<_>>())
         });
+        let space =
+            |data: Option<&[u8]>| of_space_name(&String::from_utf8_lossy(data.unwrap_or_default()), true);
+        let profile = primaries.or_else(|| space(attributes.interop)).or_else(|| space(attributes.space));
         let display_window = attributes.display_window.map(window_of).transpose()?;
         let windows = display_window.filter(|&shown| shown != data_window).map(|shown| [data_window, shown]);
-        let header = Header { size, channels, compression, top, tile, end, profile, windows };
+        let orientation = attributes.orientation.and_then(|data| Reader::new(data).i32_le().ok());
+        let orientation =
+            orientation.and_then(|stated| u8::try_from(stated).ok()).filter(|n| (1..=8).contains(n));
+        let header = Header {
+            size,
+            channels,
+            compression,
+            top,
+            tile,
+            end,
+            profile,
+            windows,
+            orientation: orientation.unwrap_or(1),
+            not_applied: attributes.not_applied(),
+        };
         if let Some(stated) = attributes.chunk_count {
             let stated = Reader::new(stated).i32_le()?;
             if u64::try_from(stated).ok() != Some(header.chunk_count()) {
                 let expected = format!("{} for {width} x {height} pixels", header.chunk_count());
-                return Err(Error::malformed(format!("{stated} chunks"), expected).at(end));
+                return Err(Error::malformed(counted(stated, "chunk"), expected).at(end));
             }
         }
         Ok(header)

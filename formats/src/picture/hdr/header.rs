@@ -1,9 +1,10 @@
 //! The text before the pixels of a Radiance picture: variables, an empty line, the resolution line.
 
-use crate::picture::HdrOrientation;
 use crate::picture::profile::of_chromaticities;
 use crate::picture::size::{Size, unsupported};
+use crate::picture::{HdrOrientation, aspect};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result, SampleType};
 
 /// Longest line and longest header that are read; programs that process a picture add a line each.
@@ -31,6 +32,8 @@ pub(super) struct Header {
     xyz: bool,
     /// Primaries that are not those of sRGB, in words.
     pub(super) profile: Option<String>,
+    /// Of pixels that are not square.
+    pub(super) remarks: Vec<String>,
     /// Product of all exposures and colour corrections, by channel.
     factors: [f64; 3],
     /// Scan lines follow each other along the first axis, pixels in a scan line along the second.
@@ -45,7 +48,7 @@ impl Header {
                 return Err(Error::malformed(format!("{other:?}"), "\"#?RADIANCE\" or \"#?RGBE\"").at(0usize));
             }
         }
-        let mut said = Said { xyz: None, profile: None, factors: [1.0; 3] };
+        let mut said = Said { xyz: None, profile: None, factors: [1.0; 3], aspect: 1.0 };
         for _ in 0..MAX_LINES {
             let at = reader.position();
             let text = line(reader)?;
@@ -60,7 +63,7 @@ impl Header {
 
     fn read_resolution(reader: &mut Reader<'_>, said: Said, limits: &Limits) -> Result<Header> {
         let at = reader.position();
-        let Said { xyz: Some(xyz), profile, factors } = said else {
+        let Said { xyz: Some(xyz), profile, factors, aspect } = said else {
             return Err(Error::malformed("no FORMAT line", "one before the empty line").at(at));
         };
         // Primaries say nothing of X, Y and Z.
@@ -80,7 +83,10 @@ impl Header {
             _ => return Err(wrong()),
         };
         let size = Size::within((u64::from(width), u64::from(height)), 3, SampleType::F32, at, limits)?;
-        Ok(Header { width: size.width, height: size.height, xyz, profile, factors, extents: [first, second] })
+        // PIXASPECT is the height of a pixel over its width.
+        let remarks = aspect::remark(1.0 / aspect, "PIXASPECT").into_iter().collect();
+        let extents = [first, second];
+        Ok(Header { width: size.width, height: size.height, xyz, profile, remarks, factors, extents })
     }
 
     pub(super) fn scanlines(&self) -> u32 {
@@ -176,7 +182,7 @@ fn line<'a>(reader: &mut Reader<'a>) -> Result<&'a str> {
     let rest = reader.rest();
     let within = rest.get(..rest.len().min(MAX_LINE)).unwrap_or_default();
     let Some(len) = within.iter().position(|&byte| byte == b'\n') else {
-        let found = format!("{} bytes without an end of line", within.len());
+        let found = format!("{} without an end of line", counted(within.len(), "byte"));
         return Err(Error::malformed(found, "a line of the header").at(at));
     };
     let text = reader.take(len)?;
@@ -189,14 +195,35 @@ struct Said {
     xyz: Option<bool>,
     profile: Option<String>,
     factors: [f64; 3],
+    aspect: f64,
 }
 
+/// The variables that say what samples and pixels mean.
+const VARIABLES: [&str; 6] = ["FORMAT", "EXPOSURE", "COLORCORR", "PRIMARIES", "GAMMA", "PIXASPECT"];
+
 impl Said {
-    /// One `NAME=value` line; comments, commands and other names say nothing about the samples.
+    /// One `NAME=value` line, blanks and case of the name aside; comments, commands and other names say nothing about the
+    /// samples. Nor do lines that begin with a tab: these were copied from the pictures that this one was made of.
     fn hear(&mut self, text: &str) -> Result<()> {
-        let Some((name, value)) = text.split_once('=') else { return Ok(()) };
-        let numbers =
-            || value.split_ascii_whitespace().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
+        if text.starts_with(['\t', '#']) {
+            return Ok(());
+        }
+        let Some((name, value)) = text.split_once('=') else { return expect_no_variable(text) };
+        let Some(name) = VARIABLES.into_iter().find(|known| known.eq_ignore_ascii_case(name.trim())) else {
+            return Ok(());
+        };
+        let numbers = || -> Option<Vec<f64>> {
+            let list = value.split_ascii_whitespace().map(|word| word.parse().ok());
+            list.collect::<Option<Vec<f64>>>().filter(|list| list.iter().all(|number| number.is_finite()))
+        };
+        let positive = |wanted: usize| {
+            let are =
+                |list: &Vec<f64>| list.len() == wanted && list.iter().all(|n| n.is_normal() && *n > 0.0);
+            numbers().filter(are).ok_or_else(|| {
+                let expected = if wanted == 1 { "a positive number" } else { "3 positive numbers" };
+                Error::malformed(format!("{text:?}"), expected)
+            })
+        };
         match name {
             "FORMAT" => {
                 let found = match value.trim() {
@@ -213,11 +240,7 @@ impl Said {
                 self.xyz = Some(found);
             }
             "EXPOSURE" | "COLORCORR" => {
-                let wanted = if name == "EXPOSURE" { 1 } else { 3 };
-                let positive = |list: &Vec<f64>| list.iter().all(|n| n.is_normal() && *n > 0.0);
-                let Some(numbers) = numbers().filter(|list| list.len() == wanted && positive(list)) else {
-                    return Err(Error::malformed(format!("{text:?}"), format!("{wanted} positive numbers")));
-                };
+                let numbers = positive(if name == "EXPOSURE" { 1 } else { 3 })?;
                 for (factor, number) in self.factors.iter_mut().zip(numbers.iter().cycle()) {
                     *factor *= number;
                 }
@@ -226,13 +249,31 @@ impl Said {
                     return Err(Error::malformed("exposures out of range", expected));
                 }
             }
-            "PRIMARIES" => self.profile = of_chromaticities(&numbers().unwrap_or_default()),
-            // Not of the format, but written by common code; what another value would mean is not agreed upon.
-            "GAMMA" if value.trim().parse() != Ok(1.0f64) => {
+            "PIXASPECT" => self.aspect *= positive(1)?.first().copied().unwrap_or(1.0),
+            "PRIMARIES" => {
+                self.profile = match numbers() {
+                    Some(numbers) => of_chromaticities(&numbers),
+                    None => Some(format!("the primaries {:?}", value.trim())),
+                };
+            }
+            // GAMMA is not of the format, but written by common code; what another value would mean is not agreed upon.
+            _ if value.trim().parse() != Ok(1.0f64) => {
                 return Err(unsupported(format!("{text:?}"), "GAMMA=1, samples in linear light"));
             }
             _ => {}
         }
         Ok(())
     }
+}
+
+/// That a line without `=` is no variable that was written in another way: `EXPOSURE 2`, `gamma: 2.2`.
+fn expect_no_variable(text: &str) -> Result<()> {
+    let end = text.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (word, rest) = text.split_at_checked(end).unwrap_or((text, ""));
+    let value = rest.trim_matches(|c: char| c == ':' || c.is_whitespace());
+    let number = value.split_ascii_whitespace().next().is_some_and(|first| first.parse::<f64>().is_ok());
+    if number && VARIABLES.iter().any(|known| known.eq_ignore_ascii_case(word)) {
+        return Err(Error::malformed(format!("{text:?}"), "a variable as NAME=value"));
+    }
+    Ok(())
 }

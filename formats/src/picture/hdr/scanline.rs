@@ -1,6 +1,7 @@
 //! One scan line of a Radiance picture in any of its three codings.
 
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Lengths for which the component-wise coding exists.
@@ -15,7 +16,11 @@ pub(super) fn read(reader: &mut Reader<'_>, len: usize, line: &mut Vec<[u8; 4]>)
         let at = reader.position();
         let stored = usize::from(u16::from_be_bytes([high, low]));
         if stored != len {
-            return Err(Error::malformed(format!("a scan line of {stored} pixels"), format!("{len}")).at(at));
+            return Err(Error::malformed(
+                format!("a scan line of {}", counted(stored, "pixel")),
+                format!("{len}"),
+            )
+            .at(at));
         }
         reader.take(4)?;
         return components(reader, len, line);
@@ -34,7 +39,7 @@ fn components(reader: &mut Reader<'_>, len: usize, line: &mut Vec<[u8; 4]>) -> R
             let code = reader.u8()?;
             let count = usize::from(if code > 128 { code & 127 } else { code });
             let Some(after) = missing.checked_sub(count).filter(|_| count > 0) else {
-                let found = format!("a run of {count} values");
+                let found = format!("a run of {}", counted(count, "value"));
                 return Err(
                     Error::malformed(found, format!("1 to {missing}, the rest of the scan line")).at(at)
                 );
@@ -71,7 +76,7 @@ fn pixels(reader: &mut Reader<'_>, len: usize, line: &mut Vec<[u8; 4]>) -> Resul
         let count = usize::from(low).checked_shl(shift).filter(|&count| count >> shift == usize::from(low));
         let missing = len.saturating_sub(line.len());
         let Some(count) = count.filter(|&count| count <= missing) else {
-            let found = format!("{low} * 2^{shift} repetitions");
+            let found = format!("{low} * 2^{}", counted(shift, "repetition"));
             return Err(
                 Error::malformed(found, format!("at most {missing}, the rest of the scan line")).at(at)
             );

@@ -7,6 +7,7 @@ use flate2::read::ZlibDecoder;
 
 use crate::picture::size::{Size, unsupported};
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Limits, Result, SampleType};
 
 /// The first eight bytes of every PNG.
@@ -44,7 +45,7 @@ impl ImageHeader {
         let chunk = Chunk::read(reader)?;
         let at = chunk.at;
         if &chunk.name != b"IHDR" || chunk.data.len() != 13 {
-            let found = format!("a first chunk {} of {} bytes", chunk.shown(), chunk.data.len());
+            let found = format!("a first chunk {} of {}", chunk.shown(), counted(chunk.data.len(), "byte"));
             return Err(Error::malformed(found, "IHDR of 13 bytes").at(at));
         }
         let mut fields = Reader::new(chunk.data);
@@ -59,7 +60,7 @@ impl ImageHeader {
             (4, 8 | 16) => (2, true),
             (6, 8 | 16) => (4, false),
             _ => {
-                let found = format!("colour type {colour} of {depth} bits");
+                let found = format!("colour type {colour} of {}", counted(depth, "bit"));
                 return Err(Error::malformed(found, "a pair of colour type and depth that PNG knows").at(at));
             }
         };
@@ -198,13 +199,16 @@ impl Walked {
             .data
             .iter()
             .fold(0u64, |sum, range| sum.saturating_add(u64::try_from(range.len()).unwrap_or(u64::MAX)));
-        let wanted = format!("{expected} bytes for {} x {} pixels", self.image.width, self.image.height);
+        let wanted =
+            format!("{} for {} x {} pixels", counted(expected, "byte"), self.image.width, self.image.height);
         match inflated {
             Err(e) => Err(Error::malformed(format!("pixel data that do not inflate: {e}"), wanted)),
             Ok(len) if len > expected => Err(Error::malformed("more pixel data", wanted)),
-            Ok(len) if len < expected => Err(Error::malformed(format!("{len} bytes of pixel data"), wanted)),
+            Ok(len) if len < expected => {
+                Err(Error::malformed(format!("{} of pixel data", counted(len, "byte")), wanted))
+            }
             Ok(_) if used != stored => Err(Error::malformed(
-                format!("{stored} bytes of compressed data"),
+                format!("{} of compressed data", counted(stored, "byte")),
                 format!("{used}, where they end"),
             )),
             Ok(_) => Ok(()),

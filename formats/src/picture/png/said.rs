@@ -5,7 +5,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 
 use super::SIGNATURE;
-use crate::picture::{orientation, profile};
+use crate::picture::{aspect, orientation, profile};
 use crate::reader::Reader;
 
 /// Longest profile or text that is inflated, bytes.
@@ -26,6 +26,10 @@ pub(super) struct Said {
     exif_colours: Option<String>,
     srgb: bool,
     numbers: Option<String>,
+    space: Option<String>,
+    xmp_colours: Option<String>,
+    calibration: Option<String>,
+    aspect: Option<String>,
 }
 
 impl Said {
@@ -47,11 +51,19 @@ impl Said {
     /// What is said of colours if it is not sRGB. Of several words cICP is above iCCP, above sRGB, above gAMA and cHRM.
     pub(super) fn profile(&self) -> Option<String> {
         let by_name = self.cicp.clone().or_else(|| self.icc.clone());
-        match by_name {
+        let weaker = [&self.numbers, &self.exif_colours, &self.xmp_colours, &self.space];
+        let colours = match by_name {
             Some(said) => said,
             None if self.srgb => None,
-            None => self.numbers.clone().or_else(|| self.exif_colours.clone()),
-        }
+            None => weaker.into_iter().flatten().next().cloned(),
+        };
+        let said: Vec<String> = colours.into_iter().chain(self.calibration.clone()).collect();
+        (!said.is_empty()).then(|| said.join(", with "))
+    }
+
+    /// What is said of pixels that are not square.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        self.aspect.iter().cloned().collect()
     }
 
     fn hear(&mut self, name: &[u8; 4], data: &[u8]) {
@@ -84,6 +96,26 @@ impl Said {
                     self.numbers.get_or_insert(told);
                 }
             }
+            b"pHYs" => {
+                let mut densities = words(data).map(f64::from);
+                if let (Some(across), Some(down)) = (densities.next(), densities.next()) {
+                    self.aspect = aspect::of_densities(across, down, "pHYs").or(self.aspect.take());
+                }
+            }
+            b"sCAL" => {
+                let mut sizes = data.get(1..).unwrap_or_default().split(|&byte| byte == 0);
+                let mut size = || std::str::from_utf8(sizes.next()?).ok()?.trim().parse::<f64>().ok();
+                if let (Some(width), Some(height)) = (size(), size()) {
+                    self.aspect = aspect::remark(width / height, "sCAL").or(self.aspect.take());
+                }
+            }
+            b"pCAL" => {
+                let name = data.split(|&byte| byte == 0).next().unwrap_or_default();
+                self.calibration = Some(format!(
+                    "a calibration of sample values {:?} (pCAL)",
+                    String::from_utf8_lossy(name)
+                ));
+            }
             b"tEXt" | b"zTXt" | b"iTXt" => self.hear_text(name, data),
             _ => {}
         }
@@ -92,6 +124,11 @@ impl Said {
     fn hear_exif(&mut self, block: &[u8]) {
         self.turn(orientation::of_exif(block));
         self.exif_colours = self.exif_colours.take().or_else(|| profile::of_exif(block));
+    }
+
+    fn hear_xmp(&mut self, packet: &[u8]) {
+        self.turn(orientation::of_xmp(packet));
+        self.xmp_colours = self.xmp_colours.take().or_else(|| profile::of_xmp(packet));
     }
 
     fn turn(&mut self, orientation: u8) {
@@ -106,7 +143,8 @@ impl Said {
             return;
         };
         let (raw, xmp) = (key.strip_prefix(b"Raw profile type "), key == b"XML:com.adobe.xmp");
-        if raw.is_none() && !xmp {
+        let space = [&b"oiio:ColorSpace"[..], b"colorInteropID"].contains(&key);
+        if raw.is_none() && !xmp && !space {
             return;
         }
         let text = match (name, rest) {
@@ -118,15 +156,20 @@ impl Said {
             }
             _ => return,
         };
+        if space {
+            let told = profile::of_space_name(&String::from_utf8_lossy(&text), false);
+            self.space = self.space.take().or(told);
+            return;
+        }
         if xmp {
-            return self.turn(orientation::of_xmp(&text));
+            return self.hear_xmp(&text);
         }
         let bytes = raw_profile(&text);
         match raw {
             Some(b"icc" | b"icm") => {
                 self.icc.get_or_insert_with(|| profile::of_icc(&bytes));
             }
-            Some(b"xmp") => self.turn(orientation::of_xmp(&bytes)),
+            Some(b"xmp") => self.hear_xmp(&bytes),
             _ => match bytes.strip_prefix(orientation::EXIF) {
                 Some(block) => self.hear_exif(block),
                 None => self.turn(orientation::of_segment(&bytes)),

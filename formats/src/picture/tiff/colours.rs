@@ -2,14 +2,16 @@
 //! applied.
 
 use super::directory::{Directory, tag};
-use crate::picture::profile::{of_chromaticities, of_exif_space, of_icc};
+use crate::picture::profile::{of_chromaticities, of_exif_space, of_icc, of_xmp};
 
 /// What is said if it is not that samples are sRGB over their full range. `most` is the largest sample of an integer
 /// type.
 pub(super) fn said(directory: &Directory<'_>, exif_space: Option<u64>, most: Option<f64>) -> Option<String> {
     let colours = match directory.bytes_of(tag::ICC_PROFILE) {
         Some(icc) => of_icc(icc),
-        None => of_tags(directory).or_else(|| of_exif_space(exif_space)),
+        None => of_tags(directory)
+            .or_else(|| of_exif_space(exif_space))
+            .or_else(|| of_xmp(directory.bytes_of(tag::XMP)?)),
     };
     let said: Vec<String> = colours.into_iter().chain(levels(directory, most)).collect();
     (!said.is_empty()).then(|| said.join(", with "))

@@ -9,6 +9,7 @@ use weezl::decode::Configuration;
 
 use super::layout::Compression;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// The caller has made sure that `len` bytes can come from so many.
@@ -20,7 +21,7 @@ pub(super) fn decompress(data: &[u8], compression: Compression, len: usize) -> R
         Compression::PackBits => pack_bits(data, len)?,
     };
     if unpacked.len() != len {
-        let found = format!("{} bytes unpacked ({compression:?})", unpacked.len());
+        let found = format!("{} unpacked ({compression:?})", counted(unpacked.len(), "byte"));
         return Err(Error::malformed(found, format!("{len}")));
     }
     Ok(unpacked)

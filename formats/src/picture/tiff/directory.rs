@@ -9,6 +9,7 @@
 
 use crate::picture::size::unsupported;
 use crate::reader::Reader;
+use crate::words::counted;
 use crate::{Error, Result};
 
 /// Numbers of the tags that are looked at.
@@ -27,6 +28,8 @@ pub(super) mod tag {
     pub(crate) const SAMPLES_PER_PIXEL: u16 = 277;
     pub(crate) const ROWS_PER_STRIP: u16 = 278;
     pub(crate) const STRIP_BYTE_COUNTS: u16 = 279;
+    pub(crate) const X_RESOLUTION: u16 = 282;
+    pub(crate) const Y_RESOLUTION: u16 = 283;
     pub(crate) const PLANAR_CONFIGURATION: u16 = 284;
     pub(crate) const GRAY_RESPONSE_CURVE: u16 = 291;
     pub(crate) const TRANSFER_FUNCTION: u16 = 301;
@@ -43,13 +46,20 @@ pub(super) mod tag {
     pub(crate) const REFERENCE_BLACK_WHITE: u16 = 532;
     pub(crate) const XMP: u16 = 700;
     pub(crate) const IMAGE_DEPTH: u16 = 32997;
+    pub(crate) const MODEL_PIXEL_SCALE: u16 = 33550;
     pub(crate) const METAMORPH_PLANES: u16 = 33629;
     pub(crate) const EXIF_IFD: u16 = 34665;
     pub(crate) const ICC_PROFILE: u16 = 34675;
     pub(crate) const COLOUR_SPACE: u16 = 40961;
+    pub(crate) const GDAL_METADATA: u16 = 42112;
+    pub(crate) const GDAL_NODATA: u16 = 42113;
     pub(crate) const LINEARIZATION_TABLE: u16 = 50712;
     pub(crate) const BLACK_LEVEL: u16 = 50714;
     pub(crate) const WHITE_LEVEL: u16 = 50717;
+    pub(crate) const DEFAULT_CROP_ORIGIN: u16 = 50719;
+    pub(crate) const DEFAULT_CROP_SIZE: u16 = 50720;
+    pub(crate) const ACTIVE_AREA: u16 = 50829;
+    pub(crate) const DEFAULT_USER_CROP: u16 = 51125;
 }
 
 /// Directories of one file that are looked at.
@@ -138,12 +148,15 @@ impl<'a> Directory<'a> {
         match (pictures.next(), pictures.len()) {
             (Some(only), 0) => only.unless_rivalled(&others),
             (Some(first), more) => Err(unsupported(
-                format!("{} pictures in {looked_at} directories ({})", more.saturating_add(1), told(&sizes)),
+                format!("{} in {} ({})",
+                    counted(more.saturating_add(1), "picture"),
+                    counted(looked_at, "directory"),
+                    told(&sizes)),
                 "one, beside smaller versions of it; save it alone in a file (tiffcp, or ImageMagick's FILE.tif[0])",
             )
             .at(first.at)),
             (None, _) => Err(unsupported(
-                format!("only smaller versions of a picture (NewSubfileType 1) in {looked_at} directories"),
+                format!("only smaller versions of a picture (NewSubfileType 1) in {}", counted(looked_at, "directory")),
                 "the full picture; a camera's raw file must be converted first, to a TIFF of 16 bits say",
             )
             .at(at)),
@@ -270,7 +283,8 @@ impl<'a> Directory<'a> {
         let left = fields.reader.rest().len();
         let needed = entry.count.saturating_mul(u64::from(len));
         if needed > u64::try_from(left).unwrap_or(u64::MAX) {
-            let found = format!("{left} bytes for the {} values of tag {tag}", entry.count);
+            let found =
+                format!("{} for the {} of tag {tag}", counted(left, "byte"), counted(entry.count, "value"));
             return Err(Error::malformed(found, format!("{needed}")).at(fields.reader.position()));
         }
         (0..entry.count).map(|_| fields.uint(usize::from(len))).collect::<Result<Vec<_>>>().map(Some)
@@ -281,10 +295,19 @@ impl<'a> Directory<'a> {
         self.entries.iter().find(|entry| entry.tag == tag).map_or(0, |entry| entry.count)
     }
 
-    /// The numbers of a tag, whole or fractions; `None` if there is no such tag, or it is of another type or cut.
+    /// The numbers of a tag, whole, fractions or doubles; `None` if there is no such tag, or it is of another type or cut.
     pub(super) fn reals(&self, tag: u16) -> Option<Vec<f64>> {
         const RATIONAL: u16 = 5;
+        const DOUBLE: u16 = 12;
         let entry = self.entries.iter().find(|entry| entry.tag == tag)?;
+        if entry.kind == DOUBLE {
+            let (numbers, _) = self.bytes_of(tag)?.as_chunks::<8>();
+            let little = self.little_endian;
+            let number = |bytes: &[u8; 8]| {
+                if little { f64::from_le_bytes(*bytes) } else { f64::from_be_bytes(*bytes) }
+            };
+            return Some(numbers.iter().map(number).collect());
+        }
         if entry.kind != RATIONAL {
             return Some(self.list(tag).ok()??.into_iter().map(|value| value as f64).collect());
         }
@@ -312,7 +335,7 @@ impl<'a> Directory<'a> {
         match (self.list(tag)?.as_deref(), default) {
             (Some([value]), _) => Ok(*value),
             (Some(list), _) => {
-                let found = format!("{} values of tag {tag}", list.len());
+                let found = format!("{} of tag {tag}", counted(list.len(), "value"));
                 Err(Error::malformed(found, "one").at(self.at))
             }
             (None, Some(value)) => Ok(value),

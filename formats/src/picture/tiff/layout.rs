@@ -1,9 +1,10 @@
 //! What the samples of a TIFF are and where they lie in the file.
 
 use super::directory::{Directory, tag};
-use super::{colours, exif_colour_space, stack};
+use super::{colours, exif_colour_space, remarks, stack};
 use crate::picture::size::{Size, unsupported};
 use crate::picture::{grey_or_rgb, orientation};
+use crate::words::counted;
 use crate::{Error, Limits, Result, SampleType};
 
 /// How the bytes of a strip or tile are packed.
@@ -78,6 +79,8 @@ pub(super) struct Layout {
     pub(super) orientation: u8,
     /// What is said of colours if it is not sRGB.
     pub(super) profile: Option<String>,
+    /// What of the picture is read and what is not, a sentence each.
+    pub(super) remarks: Vec<String>,
     rgb: bool,
     chunks: Chunks,
     /// Of the strips or tiles: offset and length.
@@ -152,6 +155,7 @@ impl Layout {
             predictor,
             orientation,
             profile: colours::said(&directory, exif_colour_space(bytes).ok().flatten(), most),
+            remarks: remarks::of(&directory, dimensions),
             rgb,
             chunks,
             places,
@@ -228,15 +232,20 @@ impl Layout {
         for chunk in self.chunks() {
             let Chunk { number, offset, len, .. } = chunk;
             if offset.checked_add(len).is_none_or(|end| end > file) {
-                let found = format!("strip or tile {number} of {len} bytes at {offset}");
-                return Err(
-                    Error::malformed(found, format!("it within the {file} bytes of the file")).at(offset)
-                );
+                let found = format!("strip or tile {number} of {} at {offset}", counted(len, "byte"));
+                return Err(Error::malformed(
+                    found,
+                    format!("it within the {} of the file", counted(file, "byte")),
+                )
+                .at(offset));
             }
             let decoded = self.decoded_bytes(&chunk);
             if len.saturating_mul(self.compression.expansion()) < decoded {
-                let found = format!("{len} bytes of strip or tile {number} ({:?})", self.compression);
-                return Err(Error::malformed(found, format!("enough for {decoded} bytes")).at(offset));
+                let found =
+                    format!("{} of strip or tile {number} ({:?})", counted(len, "byte"), self.compression);
+                return Err(
+                    Error::malformed(found, format!("enough for {}", counted(decoded, "byte"))).at(offset)
+                );
             }
         }
         self.require_apart()?;
@@ -249,7 +258,8 @@ impl Layout {
         let pairs = sorted.iter().zip(sorted.iter().skip(1));
         for (&(offset, len), &(next, _)) in pairs {
             if offset.saturating_add(len) > next {
-                let found = format!("a strip or tile of {len} bytes at {offset} and one at {next}");
+                let found =
+                    format!("a strip or tile of {} at {offset} and one at {next}", counted(len, "byte"));
                 return Err(Error::malformed(found, "none that overlap").at(next));
             }
         }
@@ -272,7 +282,7 @@ fn sample_type(directory: &Directory<'_>) -> Result<SampleType> {
         (16, 3) => Ok(SampleType::F16),
         (32, 3) => Ok(SampleType::F32),
         (bits, format) => {
-            let found = format!("samples of {bits} bits and format {format}");
+            let found = format!("samples of {} and format {format}", counted(bits, "bit"));
             Err(unsupported(found, "8 or 16 bits unsigned (1), or 16 or 32 bits float (3)").at(directory.at))
         }
     }
@@ -295,7 +305,8 @@ fn interpretation(directory: &Directory<'_>, stored: u64) -> Result<(bool, bool)
         .at(directory.at)),
         (photometric, ..) => {
             let found = format!(
-                "photometric interpretation {photometric}, {stored} channels, extra samples {extra:?}"
+                "photometric interpretation {photometric}, {}, extra samples {extra:?}",
+                counted(stored, "channel")
             );
             Err(unsupported(
                 found,
@@ -340,8 +351,8 @@ fn places(directory: &Directory<'_>) -> Result<(Chunks, Vec<(u64, u64)>)> {
     };
     if sides.contains(&0) || offsets.len() != lens.len() {
         let found = format!(
-            "{} offsets and {} lengths of strips or tiles of side {sides:?}",
-            offsets.len(),
+            "{} and {} lengths of strips or tiles of side {sides:?}",
+            counted(offsets.len(), "offset"),
             lens.len()
         );
         return Err(Error::malformed(found, "as many, and no side of 0").at(directory.at));

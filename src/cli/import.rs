@@ -158,7 +158,7 @@ impl Import {
         let report = plan.run(context)?;
         let samples = plan.description().sample_type;
         let is_cut = report.samples.clipped > 0
-            && matches!(samples, SampleType::U8 | SampleType::U16)
+            && !holds_highlights(samples)
             && (self.white - 1.0).abs() < f64::EPSILON;
         let lost = is_cut.then(|| {
             format!(
@@ -202,16 +202,22 @@ impl Import {
     }
 }
 
+/// Whether samples of a type can be above white.
+fn holds_highlights(samples: SampleType) -> bool {
+    matches!(samples, SampleType::F16 | SampleType::F32)
+}
+
 fn summary(description: &Description, report: &Report) -> String {
     let mut text = format!(
-        "{} x {} of {}, {} raw; {} written, {} found done, {} clipped at white",
+        "{} x {} of {}, {} raw; {} written, {} found done, {} {}",
         counted(description.views.len(), "view"),
         counted(description.lights.len(), "light"),
         description.size,
         bytes_text(description.bytes()),
         counted(report.views_written, "view"),
         report.views_found,
-        counted(report.samples.clipped, "sample")
+        counted(report.samples.clipped, "sample"),
+        if holds_highlights(description.sample_type) { "above white" } else { "clipped at white" }
     );
     for (count, what) in [(report.samples.not_finite, "not finite"), (report.samples.negative, "negative")] {
         if count > 0 {

@@ -135,7 +135,7 @@ fn names_that_were_exchanged_or_are_of_something_else_are_told_with_the_way_out(
     let cases: [(Command, i32, &str); 15] = [
         (run(&["model"], &[&at("new.model.zarr"), &measurement], &[]), 2, "what is read is named first"),
         (run(&["model"], &[&model, &measurement], &[]), 2, "what is read is named first"),
-        (run(&["enlarge"], &[&new, &model], &["--size", "9x9"]), 66, "--into"),
+        (run(&["enlarge"], &[&new, &model], &["--size", "9x9"]), 2, "what is read is named first"),
         (run(&["enlarge"], &[&enlarged, &at("sample.zarr")], &["--size", "9x9"]), 65, "expected a model"),
         (run(&["import"], &[&new, &archive], &[]), 66, "the store to make is named last"),
         (run(&["import"], &[&measurement, &new], &[]), 2, "is a store already"),
@@ -313,4 +313,31 @@ fn a_crafted_number_of_clusters_is_damage_and_no_want_of_memory() {
         let told = fail(btf().arg("verify").arg(&store).args(["--memory", "64MiB"]), 65);
         assert!(!told.contains("--memory"), "{told}");
     }
+}
+
+#[test]
+fn highlights_that_an_import_cuts_off_are_told_with_the_option_that_keeps_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (floats, npy) = (at("f.zarr"), at("f.npy"));
+    succeed(&mut run(
+        &["import"],
+        &[&fixture().archive(), &floats],
+        &["--samples", "f32", "--transfer", "linear"],
+    ));
+    succeed(&mut run(&["export"], &[&floats, &npy], &[]));
+    // Twice as bright.
+    let mut bytes = std::fs::read(&npy).unwrap();
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    for sample in bytes[header..].as_chunks_mut::<4>().0 {
+        *sample = (2.0 * f32::from_le_bytes(*sample)).to_le_bytes();
+    }
+    std::fs::write(&npy, bytes).unwrap();
+    for samples in ["u8", "u16"] {
+        let store = at(&format!("{samples}.zarr"));
+        let told = succeed(&mut run(&["import"], &[&npy, &store], &["--samples", samples]));
+        assert!(told.contains("above white became white") && told.contains("--samples f16"), "{told}");
+    }
+    let told = succeed(&mut run(&["import"], &[&npy, &at("f16.zarr")], &["--samples", "f16"]));
+    assert!(!told.contains("became white"), "{told}");
 }

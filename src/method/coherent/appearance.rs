@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::lattice::WaveCounts;
 use crate::shape::{Size, Window};
+use crate::words::counted;
 
 /// Features of a cluster.
 pub const FEATURES: usize = 8;
@@ -122,7 +123,10 @@ impl Appearance {
         }
         let levels = levels_of(size);
         if self.levels.len() != levels || levels > LEVELS_MOST {
-            return refused(format!("got {} levels, expected {levels} for {size}", self.levels.len()));
+            return refused(format!(
+                "got {}, expected {levels} for {size}",
+                counted(self.levels.len(), "level")
+            ));
         }
         for (number, basis) in self.levels.iter().enumerate() {
             let dims = dims_of(number, levels);

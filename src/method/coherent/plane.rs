@@ -9,6 +9,7 @@ use crate::kernel::Kernel;
 use crate::kernel::coherent::{Repetition, Subpass, correct, unpack};
 use crate::lattice::WaveCounts;
 use crate::shape::{Size, Window};
+use crate::words::counted;
 
 /// Order of the parities, (row, column), in which the sub-passes of a pass correct.
 const PARITIES: [[i64; 2]; 4] = [[0, 0], [1, 1], [0, 1], [1, 0]];
@@ -79,8 +80,8 @@ impl Plane {
             for &cluster in &row[exemplar.x..exemplar.x + exemplar.size.width] {
                 texels.push(*appearance.features.get(usize::from(cluster)).ok_or_else(|| {
                     Error::input(format!(
-                        "appearance: got features of {} clusters, the index has cluster {cluster}",
-                        appearance.features.len()
+                        "appearance: got features of {}, the index has cluster {cluster}",
+                        counted(appearance.features.len(), "cluster")
                     ))
                 })?);
             }

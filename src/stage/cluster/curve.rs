@@ -14,6 +14,7 @@ use crate::run::progress::Counted;
 use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::{Amount, MOST_CLUSTERS, Options as ClusterOptions, Plan as ClusterPlan};
 use crate::store::model::index_bytes;
+use crate::words::counted;
 
 /// Texels of the sample to each of the most clusters, at least: of fewer, clusters are hardly more than single texels,
 /// and the error of a sample tells nothing of the others.
@@ -75,8 +76,8 @@ pub struct Plan {
 pub fn plan(options: &Options) -> Result<Plan> {
     if !(2..=MOST_CLUSTERS).contains(&options.most) {
         return Err(Error::usage(format!(
-            "a curve up to {} clusters was asked for, expected 2 to {MOST_CLUSTERS}",
-            options.most
+            "a curve up to {} was asked for, expected 2 to {MOST_CLUSTERS}",
+            counted(options.most, "cluster")
         )));
     }
     // Planned for one cluster, so that the sample is no larger for there being many.

@@ -69,8 +69,8 @@ impl Plan {
         context.progress.end();
         if let Some(last) = history.attempts.last().filter(|last| clustering.nearest.len() <= last.clusters) {
             return Err(Error::usage(format!(
-                "{} clusters, as many as a sample of {} gives, leave a mean |dL*| of {:.3}",
-                last.clusters,
+                "{}, as many as a sample of {} gives, leave a mean |dL*| of {:.3}",
+                counted(last.clusters, "cluster"),
                 counted(points.len(), "texel"),
                 last.mean_lightness_error
             ))

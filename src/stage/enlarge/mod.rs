@@ -25,6 +25,7 @@ use crate::stage::cluster;
 use crate::stage::import::Shard;
 use crate::store::enlarged::{EnlargeRecipe, Enlarged, Method};
 use crate::store::model::{Model, Stage, index_bytes};
+use crate::words::counted;
 pub use verdict::Verdict;
 
 /// How to enlarge.
@@ -214,7 +215,7 @@ impl Plan {
     /// Makes the outputs one after the other, each from where it was left.
     pub fn run(&self, context: &Context<'_>) -> Result<Vec<Report>> {
         let needed = self.rule.memory_bytes(&self.subject, context.threads);
-        let what = format!("an enlargement {} texels wide", self.subject.options.size.width);
+        let what = format!("an enlargement {} wide", counted(self.subject.options.size.width, "texel"));
         context.memory().require(&what, needed, self.rule.advice())?;
         let units = self.rule.make(&self.subject, &self.outputs, context)?;
         let clusters = &self.subject.clusters;

@@ -10,6 +10,7 @@ use crate::shape::{Size, Window};
 use crate::stage::image::model_of;
 use crate::store::enlarged::{Enlarged, KIND, SHARD_SIDE};
 use crate::store::model::Stage;
+use crate::words::counted;
 use crate::zarr::metadata::OLDEST_FORMAT;
 
 /// Memory that a shard takes while it is looked at.
@@ -97,10 +98,10 @@ fn tile(enlarged: &Enlarged, path: &Path, named: Option<&Path>, report: &mut Rep
     let of_index = [enlarged.tile().unwrap_or(described[0]), Size::new(enlarged.clusters(), 0)];
     if enlarged.format() > OLDEST_FORMAT && described != of_index {
         let what = format!(
-            "{}: got a tile of {} and {} clusters, the model has {} and {}",
+            "{}: got a tile of {} and {}, the model has {} and {}",
             path.display(),
             of_index[0],
-            of_index[1].height,
+            counted(of_index[1].height, "cluster"),
             described[0],
             described[1].height
         );

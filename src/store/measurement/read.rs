@@ -12,6 +12,7 @@ use super::{CHUNK_SIDE, Measurement, SampleArray};
 use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
+use crate::words::counted;
 use crate::zarr::codec::{Chunk, ChunkCodec};
 use crate::zarr::{DAMAGED, Store, shard};
 
@@ -64,9 +65,9 @@ impl Measurement {
         let beyond = windows.iter().find(|window| !window.fits(self.description.size));
         if let Some(window) = beyond.or(windows.first().filter(|_| view >= self.description.views.len())) {
             return Err(Error::input(format!(
-                "{}: asked for {window} of view {view}, there are {} views of {}",
+                "{}: asked for {window} of view {view}, there are {} of {}",
                 self.path().display(),
-                self.description.views.len(),
+                counted(self.description.views.len(), "view"),
                 self.description.size
             )));
         }

@@ -19,6 +19,7 @@ use crate::method::field::fit::car::Prior;
 use crate::method::field::marginals::{Marginals, Matching, NODES};
 use crate::method::field::{self, CarKind, Coordinates, Gains, Level, Surface};
 use crate::run::recipe::Recipe;
+use crate::words::counted;
 use crate::zarr::{Layout, Store};
 
 /// Farthest site that a stored neighbourhood may have: rows as far back are kept in memory.
@@ -132,7 +133,7 @@ impl FieldReport {
         if levels.is_some_and(|levels| levels != self.levels.len())
             || !(1..=MOST_LEVELS).contains(&self.levels.len())
         {
-            return Err(format!("got {} levels, the recipe says {levels:?}", self.levels.len()));
+            return Err(format!("got {}, the recipe says {levels:?}", counted(self.levels.len(), "level")));
         }
         match self.levels.iter().position(|level| !(1..=MOST_SITES).contains(&level.eta)) {
             None => Ok(()),

@@ -8,7 +8,7 @@ use btfkit::kernel::Kernel;
 use btfkit::kernel::counting::{STRIP, lower_medians};
 use btfkit::kernel::predict::{self, Deltas, Numbers, Predictor, Shape};
 use btfkit::method::cluster::points::Arrangement;
-use btfkit::method::field::{Boundary, Extent, Field, Gains, Kind, Options, Synthesis, fit};
+use btfkit::method::field::{Boundary, CarKind, Extent, Field, Gains, Options, Synthesis, fit};
 use btfkit::random::Hash;
 use btfkit_formats::{Direction, SampleType, Samples};
 use divan::counter::{BytesCount, ItemsCount};
@@ -154,8 +154,8 @@ fn lightness_codes(bencher: Bencher<'_, '_>) {
 }
 
 /// Rows of a synthesised field, 1024 texels wide.
-#[divan::bench(args = [Kind::Car3d, Kind::Car2d])]
-fn synthesis(bencher: Bencher<'_, '_>, kind: Kind) {
+#[divan::bench(args = [CarKind::Car3d, CarKind::Car2d])]
+fn synthesis(bencher: Bencher<'_, '_>, kind: CarKind) {
     // White noise smoothed by its neighbours, so that the fit takes a neighbourhood of some size.
     let noise: Vec<f64> = normals(64 * 64, 2).into_iter().flatten().map(f64::from).collect();
     let smooth =

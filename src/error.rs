@@ -1,7 +1,7 @@
 //! The library's one error: what went wrong, whose fault it is, what to do.
 
 use std::fmt;
-use std::io::ErrorKind;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::text::escaped;
 
 /// Whose fault an [`Error`] is. The program turns it into its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ErrorKind {
     /// A request that cannot be meant: options that contradict each other or the data.
     Usage,
     /// The input is damaged, incomplete or not what it says it is.
@@ -33,7 +33,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// where there is one, a hint that says what to do.
 #[derive(Debug)]
 pub struct Error {
-    kind: Kind,
+    kind: ErrorKind,
     message: String,
     hint: Option<String>,
     source: Option<Box<dyn std::error::Error + Send + Sync>>,
@@ -41,54 +41,54 @@ pub struct Error {
 
 impl Error {
     /// An error of the given kind. The message is one line: what would end it, or lead a terminal astray, is escaped.
-    pub fn new(kind: Kind, message: impl Into<String>) -> Self {
+    pub fn new(kind: ErrorKind, message: impl Into<String>) -> Self {
         Self { kind, message: escaped(&message.into()).into_owned(), hint: None, source: None }
     }
 
     /// An error whose message has several lines.
-    pub fn list<S: AsRef<str>>(kind: Kind, lines: impl IntoIterator<Item = S>) -> Self {
+    pub fn list<S: AsRef<str>>(kind: ErrorKind, lines: impl IntoIterator<Item = S>) -> Self {
         let lines: Vec<String> = lines.into_iter().map(|line| escaped(line.as_ref()).into_owned()).collect();
         Self { message: lines.join("\n"), ..Self::new(kind, "") }
     }
 
-    /// [`Kind::Usage`].
+    /// [`ErrorKind::Usage`].
     pub fn usage(message: impl Into<String>) -> Self {
-        Self::new(Kind::Usage, message)
+        Self::new(ErrorKind::Usage, message)
     }
 
-    /// [`Kind::Input`].
+    /// [`ErrorKind::Input`].
     pub fn input(message: impl Into<String>) -> Self {
-        Self::new(Kind::Input, message)
+        Self::new(ErrorKind::Input, message)
     }
 
-    /// [`Kind::Recipe`].
+    /// [`ErrorKind::Recipe`].
     pub fn recipe(message: impl Into<String>) -> Self {
-        Self::new(Kind::Recipe, message)
+        Self::new(ErrorKind::Recipe, message)
     }
 
-    /// [`Kind::Missing`].
+    /// [`ErrorKind::Missing`].
     pub fn missing(message: impl Into<String>) -> Self {
-        Self::new(Kind::Missing, message)
+        Self::new(ErrorKind::Missing, message)
     }
 
-    /// [`Kind::Internal`].
+    /// [`ErrorKind::Internal`].
     pub fn internal(message: impl Into<String>) -> Self {
-        Self::new(Kind::Internal, message)
+        Self::new(ErrorKind::Internal, message)
     }
 
-    /// [`Kind::Stopped`].
+    /// [`ErrorKind::Stopped`].
     pub fn stopped() -> Self {
-        Self::new(Kind::Stopped, "stopped on request").hint("run the same command again to go on")
+        Self::new(ErrorKind::Stopped, "stopped on request").hint("run the same command again to go on")
     }
 
-    /// The operating system refused `action` on `path`: [`Kind::Io`], or [`Kind::Missing`] where there is nothing to
-    /// read.
+    /// The operating system refused `action` on `path`: [`ErrorKind::Io`], or [`ErrorKind::Missing`] where there is
+    /// nothing to read.
     pub fn io(action: &str, path: &Path, source: std::io::Error) -> Self {
         let reading = matches!(action, "read" | "list" | "open");
         let kind = match source.kind() {
-            ErrorKind::NotFound if reading => Kind::Missing,
-            _ if reading && is_loop(&source) => Kind::Missing,
-            _ => Kind::Io,
+            io::ErrorKind::NotFound if reading => ErrorKind::Missing,
+            _ if reading && is_loop(&source) => ErrorKind::Missing,
+            _ => ErrorKind::Io,
         };
         Self {
             hint: advice(&source, reading).map(str::to_owned),
@@ -97,11 +97,11 @@ impl Error {
         .caused_by(source)
     }
 
-    /// [`Kind::Io`]: the operating system refused `action` on a file that the caller [names](Self::at).
+    /// [`ErrorKind::Io`]: the operating system refused `action` on a file that the caller [names](Self::at).
     pub fn refused(action: &str, source: std::io::Error) -> Self {
         Self {
             hint: advice(&source, false).map(str::to_owned),
-            ..Self::new(Kind::Io, format!("cannot {action}: {source}"))
+            ..Self::new(ErrorKind::Io, format!("cannot {action}: {source}"))
         }
         .caused_by(source)
     }
@@ -115,7 +115,7 @@ impl Error {
     #[must_use]
     pub fn at(self, path: &Path) -> Self {
         let name = escaped(&path.display().to_string()).into_owned();
-        if self.kind == Kind::Io && !self.message.contains(&name) { self.context(name) } else { self }
+        if self.kind == ErrorKind::Io && !self.message.contains(&name) { self.context(name) } else { self }
     }
 
     /// Adds what the user can do about it.
@@ -139,7 +139,7 @@ impl Error {
     }
 
     /// Whose fault it is.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 
@@ -169,9 +169,9 @@ impl From<btfkit_formats::Error> for Error {
         match shared.or_else(|| source?.downcast_ref::<std::io::Error>()) {
             Some(source) => {
                 let hint = advice(source, false).map(str::to_owned);
-                Self { hint, ..Self::new(Kind::Io, format!("cannot write: {source}")) }
+                Self { hint, ..Self::new(ErrorKind::Io, format!("cannot write: {source}")) }
             }
-            None => Self::list(Kind::Input, error.to_string().lines()),
+            None => Self::list(ErrorKind::Input, error.to_string().lines()),
         }
         .caused_by(error)
     }
@@ -180,7 +180,7 @@ impl From<btfkit_formats::Error> for Error {
 /// Whether the operating system lets nobody, or not this user, do it: a file system that is read-only, or no
 /// permission.
 pub(crate) fn is_denied(error: &std::io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied)
+    matches!(error.kind(), io::ErrorKind::ReadOnlyFilesystem | io::ErrorKind::PermissionDenied)
 }
 
 /// Whether links lead back to themselves.
@@ -190,19 +190,38 @@ pub(crate) fn is_loop(error: &std::io::Error) -> bool {
     error.raw_os_error() == Some(LOOP)
 }
 
+/// What to do where the system starts no more threads.
+pub(crate) const NO_THREADS: &str =
+    "choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)";
+
+/// Whether an operating system's error has this number; the numbers of Linux and of the systems after BSD are the same.
+fn is_number(error: &std::io::Error, numbers: &[i32]) -> bool {
+    error.raw_os_error().is_some_and(|number| numbers.contains(&number))
+}
+
 /// What to do about what the operating system refused.
 pub(crate) fn advice(error: &std::io::Error, reading: bool) -> Option<&'static str> {
+    /// `ENFILE` and `EMFILE`: the system or this process has too many files open.
+    const TOO_MANY_FILES: [i32; 2] = [23, 24];
+    /// `EAGAIN`, of Linux and of BSD: no more threads or locks.
+    const TOO_MANY_THREADS: [i32; 1] = [if cfg!(target_os = "linux") { 11 } else { 35 }];
+    if is_number(error, &TOO_MANY_FILES) {
+        return Some("too many files are open: raise the limit (ulimit -n 1024), or choose fewer --threads");
+    }
+    if is_number(error, &TOO_MANY_THREADS) {
+        return Some(NO_THREADS);
+    }
     match error.kind() {
-        ErrorKind::StorageFull => Some("free some space and run the same command again"),
-        ErrorKind::QuotaExceeded => {
+        io::ErrorKind::StorageFull => Some("free some space and run the same command again"),
+        io::ErrorKind::QuotaExceeded => {
             Some("your quota of this disk is used up: free some of it and run the same command again")
         }
-        ErrorKind::FileTooLarge => {
+        io::ErrorKind::FileTooLarge => {
             Some("files may not be that large here: raise the limit (ulimit -f), or choose another place")
         }
-        ErrorKind::ReadOnlyFilesystem => Some("choose a place that can be written to"),
-        ErrorKind::PermissionDenied if reading => Some("ask for the right to read it"),
-        ErrorKind::PermissionDenied => Some("choose a place that you may write to"),
+        io::ErrorKind::ReadOnlyFilesystem => Some("choose a place that can be written to"),
+        io::ErrorKind::PermissionDenied if reading => Some("ask for the right to read it"),
+        io::ErrorKind::PermissionDenied => Some("choose a place that you may write to"),
         _ => None,
     }
 }
@@ -217,7 +236,7 @@ mod tests {
         struct Full;
         impl std::io::Write for Full {
             fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
-                Err(std::io::Error::from(ErrorKind::StorageFull))
+                Err(std::io::Error::from(io::ErrorKind::StorageFull))
             }
             fn flush(&mut self) -> std::io::Result<()> {
                 Ok(())
@@ -225,7 +244,7 @@ mod tests {
         }
         let mut zip = btfkit_formats::zip::ZipWriter::new(Full);
         let error = Error::from(zip.write_entry("a", b"b").unwrap_err()).at(Path::new("o.zip"));
-        assert_eq!(error.kind(), Kind::Io);
+        assert_eq!(error.kind(), ErrorKind::Io);
         assert!(error.to_string().starts_with("o.zip: "), "{error}");
         assert!(error.guidance().unwrap().contains("space") && std::error::Error::source(&error).is_some());
     }
@@ -236,26 +255,26 @@ mod tests {
         for error in [
             Error::input(name.display().to_string()),
             Error::input("x").context(name.display()),
-            Error::io("read", name, std::io::Error::from(ErrorKind::NotFound)),
+            Error::io("read", name, std::io::Error::from(io::ErrorKind::NotFound)),
         ] {
             assert!(!error.to_string().contains(['\n', '\u{1b}']), "{error}");
         }
-        assert_eq!(Error::list(Kind::Input, ["a\u{7}", "b"]).to_string(), "a\\u{7}\nb");
+        assert_eq!(Error::list(ErrorKind::Input, ["a\u{7}", "b"]).to_string(), "a\\u{7}\nb");
     }
 
     #[test]
     fn what_can_be_done_is_said_of_each_refusal_and_no_name_twice() {
         for (kind, reading, words) in [
-            (ErrorKind::StorageFull, false, "free some space"),
-            (ErrorKind::QuotaExceeded, false, "quota"),
-            (ErrorKind::FileTooLarge, false, "ulimit -f"),
-            (ErrorKind::ReadOnlyFilesystem, false, "a place that can be written to"),
-            (ErrorKind::PermissionDenied, false, "a place that you may write to"),
-            (ErrorKind::PermissionDenied, true, "the right to read it"),
+            (io::ErrorKind::StorageFull, false, "free some space"),
+            (io::ErrorKind::QuotaExceeded, false, "quota"),
+            (io::ErrorKind::FileTooLarge, false, "ulimit -f"),
+            (io::ErrorKind::ReadOnlyFilesystem, false, "a place that can be written to"),
+            (io::ErrorKind::PermissionDenied, false, "a place that you may write to"),
+            (io::ErrorKind::PermissionDenied, true, "the right to read it"),
         ] {
             let (action, path) = (if reading { "read" } else { "write" }, Path::new("a.png"));
             let error = Error::io(action, path, std::io::Error::from(kind)).at(path);
-            assert_eq!(error.kind(), Kind::Io);
+            assert_eq!(error.kind(), ErrorKind::Io);
             assert_eq!(error.to_string().matches("a.png").count(), 1, "{error}");
             assert!(error.guidance().unwrap().contains(words), "{kind}: {:?}", error.guidance());
         }

@@ -2,7 +2,8 @@
 //! size (Filip and Haindl 2007, "BTF modelling using BRDF texels").
 //!
 //! ```text
-//! archive -import-> measurement -tile, cluster, normals, fit, appearance-> model -enlarge-> enlargement -image-> picture
+//! archive -import-> measurement -tile, cluster, normals, fit, appearance-> model -enlarge-> enlargement -image->
+//! picture
 //! ```
 //!
 //! # From an archive to values of an enlarged texture
@@ -58,23 +59,23 @@
 //! # Where things are
 //!
 //! [`stage`] holds what each command does, [`method`] the steps of the paper as pure computation, [`check`] what can be
-//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean, over [`zarr`]
-//! and [`disk`]. [`run`] makes long work survive, [`kernel`] holds the hot loops.
+//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean, over
+//! [`zarr`] and [`disk`]. [`run`] makes long work survive, [`kernel`] holds the hot loops.
 //!
 //! # Errors
 //!
-//! Every error has a [`Kind`], which decides the exit code of the program, a message that names the file and the place in
-//! it, and often a hint what to do ([`Error::guidance`]).
+//! Every error has a [`ErrorKind`], which decides the exit code of the program, a message that names the file and the place
+//! in it, and often a hint what to do ([`Error::guidance`]).
 //!
 //! | kind | meaning | exit code |
 //! | --- | --- | --- |
-//! | [`Kind::Usage`] | an argument that cannot be | 2 |
-//! | [`Kind::Input`] | an archive or a store that is damaged, or is something else | 65 |
-//! | [`Kind::Recipe`] | a result that was made with other options lies where this one is to be | 65 |
-//! | [`Kind::Missing`] | an input that is not there, or not yet | 66 |
-//! | [`Kind::Io`] | the system refuses to read or write | 74 |
-//! | [`Kind::Stopped`] | stopped on request; running it again goes on | 75 |
-//! | [`Kind::Internal`] | a fault of this program, or no memory | 1 |
+//! | [`ErrorKind::Usage`] | an argument that cannot be | 2 |
+//! | [`ErrorKind::Input`] | an archive or a store that is damaged, or is something else | 65 |
+//! | [`ErrorKind::Recipe`] | a result that was made with other options lies where this one is to be | 65 |
+//! | [`ErrorKind::Missing`] | an input that is not there, or not yet | 66 |
+//! | [`ErrorKind::Io`] | the system refuses to read or write | 74 |
+//! | [`ErrorKind::Stopped`] | stopped on request; running it again goes on | 75 |
+//! | [`ErrorKind::Internal`] | a fault of this program, or no memory | 1 |
 //!
 //! # Features
 //!
@@ -107,4 +108,4 @@ pub mod words;
 pub mod zarr;
 
 pub use btfkit_formats::Direction;
-pub use error::{Error, Kind, Result};
+pub use error::{Error, ErrorKind, Result};

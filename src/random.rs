@@ -38,7 +38,7 @@ impl Hash {
     /// Standard normals of columns `first_column ..` of a row in one channel: see [`noise::normals`].
     pub fn normal_row(&self, kernel: Kernel, row: i32, first_column: i32, channel: u32, out: &mut [f32]) {
         let Self { key, domain } = *self;
-        noise::normals(kernel, noise::Place { key, domain, row, first_column, channel }, out);
+        noise::normals(kernel, noise::Site { key, domain, row, first_column, channel }, out);
     }
 
     /// A whole number below `bound` (which must not be 0), from the place (a, b, c).

@@ -16,7 +16,7 @@ use ::hdf5::types::{FixedAscii, VarLenUnicode};
 use ::hdf5::{Dataset, File, Group, H5Type};
 use btfkit::archive::hdf5::{Archive, Writer, recognise};
 use btfkit::shape::{Size, Window};
-use btfkit::{Kind, Result};
+use btfkit::{ErrorKind, Result};
 use btfkit_formats::{Contents, Direction, Limits, SampleType, Samples, f16};
 use ndarray::{Array2, Array4, ArrayD};
 use serde_json::{Map, json};
@@ -93,7 +93,7 @@ static FILES: RwLock<()> = RwLock::new(());
 /// The message of an error that must be one of the input.
 fn refused(path: &Path) -> String {
     let Err(error) = open(path) else { panic!("{} is read", path.display()) };
-    assert_eq!(error.kind(), Kind::Input, "{error}");
+    assert_eq!(error.kind(), ErrorKind::Input, "{error}");
     assert!(error.to_string().contains(&path.display().to_string()), "{error}");
     error.to_string()
 }

@@ -1,6 +1,8 @@
 //! Behaviour of the program and the library, on samples that they make themselves.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout, unreachable_pub)]
 
+#[path = "behaviour/advice.rs"]
+mod advice;
 #[path = "behaviour/archives.rs"]
 mod archives;
 #[path = "behaviour/at_once.rs"]

@@ -36,5 +36,5 @@ mod writer;
 pub use archive::{Archive, OpenOptions, RowOrder};
 pub use color::ColorModel;
 pub use scalar::Scalar;
-pub use signature::{Kind, recognise};
+pub use signature::{BonnKind, recognise};
 pub use writer::{Description, Writer};

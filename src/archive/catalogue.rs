@@ -8,7 +8,7 @@ use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Limits, Pair, rti, tabl
 use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
 use super::{Options, list_of_bounded_size, read_beside};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::words::counted;
 
 /// A complete set of images, how it was found, and what had to be assumed.
@@ -298,7 +298,7 @@ pub(super) fn left_out(files: &Files, left: impl Iterator<Item = bool>) -> Optio
 
 fn incomplete(archive: &Path, errors: &CatalogueErrors, left_out: Option<String>) -> Error {
     let lines: Vec<String> = errors.to_string().lines().map(str::to_owned).chain(left_out).collect();
-    Error::list(Kind::Input, lines)
+    Error::list(ErrorKind::Input, lines)
         .context(archive.display())
         .hint("expected one picture for each pair of directions")
 }

@@ -114,9 +114,10 @@ fn order(options: &Options) -> Result<Order> {
         None => Ok(Order::Stated),
         Some("ubo81") => Ok(Order::Ubo81),
         Some("uniform") => Ok(Order::Uniform),
-        Some(name) => {
-            Err(Error::new(crate::Kind::Usage, format!("got the order {name:?}, expected ubo81 or uniform")))
-        }
+        Some(name) => Err(Error::new(
+            crate::ErrorKind::Usage,
+            format!("got the order {name:?}, expected ubo81 or uniform"),
+        )),
     }
 }
 
@@ -162,7 +163,7 @@ fn directions_beside(path: &Path, options: &Options, limits: &Limits) -> Result<
     let mut beside = Beside { views: list("views")?, lights: list("lights")?, channels };
     if let Some(name) = &options.order {
         let published = directions::published(name).ok_or_else(|| {
-            Error::new(crate::Kind::Usage, format!("got the list {name:?}, expected ubo81 or bonn151"))
+            Error::new(crate::ErrorKind::Usage, format!("got the list {name:?}, expected ubo81 or bonn151"))
         })?;
         let published: Vec<Direction> =
             published.into_iter().map(btfkit_formats::Angles::direction).collect();

@@ -54,10 +54,10 @@ struct Zip {
 
 struct Entry {
     name: String,
-    place: Place,
+    place: Location,
 }
 
-enum Place {
+enum Location {
     Zipped { zip: usize, entry: usize },
     Plain(PathBuf),
 }
@@ -68,8 +68,8 @@ impl Files {
     /// its lists in a folder of their own).
     ///
     /// # Errors
-    /// Says where a zip is damaged, and what is no file. A file that stands alone and is of a known format that is not read is
-    /// called by its name.
+    /// Says where a zip is damaged, and what is no file. A file that stands alone and is of a known format that is not
+    /// read is called by its name.
     pub(super) fn list(paths: &[PathBuf], limits: &Limits) -> Result<Self> {
         let mut files = Self { zips: Vec::new(), entries: Vec::new(), list: None, hidden: 0 };
         for path in paths {
@@ -106,24 +106,24 @@ impl Files {
         }
         let named = fs::canonicalize(list).map_err(|error| Error::io("read", list, error))?;
         let is_named = |entry: &Entry| match &entry.place {
-            Place::Plain(path) => {
+            Location::Plain(path) => {
                 path.file_name() == list.file_name() && fs::canonicalize(path).is_ok_and(|path| path == named)
             }
-            Place::Zipped { .. } => false,
+            Location::Zipped { .. } => false,
         };
         self.list = self.entries.iter().position(is_named);
         if self.list.is_none() {
             // In a hidden folder, or too deep below the one above.
             self.list = Some(self.entries.len());
             let name = list.to_string_lossy().into_owned();
-            self.entries.push(Entry { name, place: Place::Plain(list.to_owned()) });
+            self.entries.push(Entry { name, place: Location::Plain(list.to_owned()) });
         }
         Ok(())
     }
 
     /// Refuses a single file of a known format that is not read.
     fn expect_known(&self, path: &Path) -> Result<()> {
-        let foreign = |entry: &Entry| matches!(&entry.place, Place::Plain(plain) if plain == path);
+        let foreign = |entry: &Entry| matches!(&entry.place, Location::Plain(plain) if plain == path);
         let alone = self.entries.last().is_some_and(foreign);
         match picture::foreign(&path.to_string_lossy(), &read_head(path, HEAD_BYTES)?).filter(|_| alone) {
             Some((what, way_out)) => {
@@ -138,8 +138,8 @@ impl Files {
     pub(super) fn foreign(&self) -> Option<String> {
         let told = |number: usize| {
             let head = match &self.entries.get(number)?.place {
-                Place::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
-                Place::Zipped { .. } => self.bytes(number).ok()?,
+                Location::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
+                Location::Zipped { .. } => self.bytes(number).ok()?,
             };
             let (what, way_out) = picture::foreign(self.name(number), &head)?;
             self.release(number);
@@ -161,7 +161,7 @@ impl Files {
     fn add(&mut self, path: PathBuf, limits: &Limits) -> Result<()> {
         if !is_zip(&path)? {
             let name = path.to_string_lossy().into_owned();
-            self.entries.push(Entry { name, place: Place::Plain(path) });
+            self.entries.push(Entry { name, place: Location::Plain(path) });
             return Ok(());
         }
         let file = MappedFile::open(&path).map_err(|error| Error::io("read", &path, error))?;
@@ -175,7 +175,7 @@ impl Files {
                 self.hidden += 1;
                 continue;
             }
-            let place = Place::Zipped { zip, entry };
+            let place = Location::Zipped { zip, entry };
             self.entries.push(Entry { name: listed.name().to_owned(), place });
         }
         self.zips.push(Zip { path, file, index });
@@ -200,7 +200,7 @@ impl Files {
     /// Name of a file for messages: with its zip, where there are several.
     pub(super) fn shown(&self, number: usize) -> String {
         match self.entries.get(number).map(|entry| &entry.place) {
-            Some(&Place::Zipped { zip, .. }) if self.zips.len() > 1 => {
+            Some(&Location::Zipped { zip, .. }) if self.zips.len() > 1 => {
                 format!("{}: {}", self.zips[zip].path.display(), self.name(number))
             }
             _ => self.name(number).to_owned(),
@@ -209,18 +209,18 @@ impl Files {
 
     /// Whether a file lies in a zip.
     pub(super) fn is_zipped(&self, number: usize) -> bool {
-        self.entries.get(number).is_some_and(|entry| matches!(entry.place, Place::Zipped { .. }))
+        self.entries.get(number).is_some_and(|entry| matches!(entry.place, Location::Zipped { .. }))
     }
 
     /// The bytes of a file.
     pub(super) fn bytes(&self, number: usize) -> Result<Cow<'_, [u8]>> {
         match &self.entries[number].place {
-            Place::Plain(path) => {
+            Location::Plain(path) => {
                 let mut bytes = Vec::new();
                 let read = regular(path)?.read_to_end(&mut bytes);
                 read.map(|_| Cow::Owned(bytes)).map_err(|error| Error::io("read", path, error))
             }
-            &Place::Zipped { zip, entry } => {
+            &Location::Zipped { zip, entry } => {
                 let Zip { path, file, index } = &self.zips[zip];
                 let bytes = index.read(file.as_ref(), entry);
                 bytes.map_err(|error| Error::from(error).context(path.display()))
@@ -228,22 +228,24 @@ impl Files {
         }
     }
 
-    /// Bytes that are in memory while a file is decoded: its own, compressed and not, and those of a copy that a decoder
-    /// may make.
+    /// Bytes that are in memory while a file is decoded: its own, compressed and not, and those of a copy that a
+    /// decoder may make.
     pub(super) fn bytes_in_use(&self, number: usize) -> u64 {
         match &self.entries[number].place {
-            Place::Plain(path) => fs::metadata(path).map_or(0, |data| data.len().saturating_mul(2)),
-            &Place::Zipped { zip, entry } => self.zips[zip].index.entries().get(entry).map_or(0, |listed| {
-                let compressed = listed.compressed_range().len() as u64;
-                let copies = if listed.method() == Method::Stored { 1 } else { 2 };
-                listed.uncompressed_bytes().saturating_mul(copies).saturating_add(compressed)
-            }),
+            Location::Plain(path) => fs::metadata(path).map_or(0, |data| data.len().saturating_mul(2)),
+            &Location::Zipped { zip, entry } => {
+                self.zips[zip].index.entries().get(entry).map_or(0, |listed| {
+                    let compressed = listed.compressed_range().len() as u64;
+                    let copies = if listed.method() == Method::Stored { 1 } else { 2 };
+                    listed.uncompressed_bytes().saturating_mul(copies).saturating_add(compressed)
+                })
+            }
         }
     }
 
     /// Gives back the memory of a file that has been used: pages of a mapped archive count as resident.
     pub(super) fn release(&self, number: usize) {
-        if let Place::Zipped { zip, entry } = self.entries[number].place
+        if let Location::Zipped { zip, entry } = self.entries[number].place
             && let Some(listed) = self.zips[zip].index.entries().get(entry)
         {
             self.zips[zip].file.release(listed.compressed_range());
@@ -253,8 +255,8 @@ impl Files {
     /// CRC-32 of a file whose bytes these are: the same in a zip, which has it listed, and in a folder.
     pub(super) fn checksum(&self, number: usize, bytes: &[u8]) -> u32 {
         match self.entries[number].place {
-            Place::Zipped { zip, entry } => self.zips[zip].index.entries()[entry].crc32(),
-            Place::Plain(_) => crc32fast::hash(bytes),
+            Location::Zipped { zip, entry } => self.zips[zip].index.entries()[entry].crc32(),
+            Location::Plain(_) => crc32fast::hash(bytes),
         }
     }
 }

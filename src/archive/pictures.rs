@@ -10,7 +10,7 @@ use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
 use super::catalogue::{self, Found};
 use super::files::Files;
 use super::{Options, Source};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::units::each_at_once;
 use crate::run::{Context, recipe};
 use crate::words::counted;
@@ -277,5 +277,5 @@ pub(super) fn fail_on(archive: &Path, problems: &[String]) -> Result<()> {
     if problems.len() > NAMED_PROBLEMS {
         lines.push(format!("  and {} more", problems.len() - NAMED_PROBLEMS));
     }
-    Err(Error::list(Kind::Input, lines))
+    Err(Error::list(ErrorKind::Input, lines))
 }

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use serde_json::json;
 
 use super::angular::angle;
-use super::finding::{Check, Finding, Place, Severity, confidence, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, confidence, round};
 use super::statistics::Statistics;
 use crate::words::counted;
 use btfkit_formats::Direction;
@@ -81,8 +81,8 @@ pub fn check(statistics: &Statistics) -> Check {
         .collect();
     let mut findings = Vec::new();
     if !equal.is_empty() {
-        let places: Vec<Place> =
-            equal.iter().flatten().map(|&(view, light)| Place::image(view, light)).collect();
+        let places: Vec<ImageSelection> =
+            equal.iter().flatten().map(|&(view, light)| ImageSelection::image(view, light)).collect();
         findings.push(Finding {
             code: "duplicate-image",
             severity: Severity::Fault,
@@ -100,10 +100,10 @@ pub fn check(statistics: &Statistics) -> Check {
         });
     }
     if !near.is_empty() {
-        let places: Vec<Place> = near
+        let places: Vec<ImageSelection> = near
             .iter()
             .flat_map(|(a, b, _)| [a, b])
-            .map(|&(view, light)| Place::image(view, light))
+            .map(|&(view, light)| ImageSelection::image(view, light))
             .collect();
         let pairs: Vec<_> =
             near.iter().map(|(a, b, difference)| json!([a, b, round(*difference, 5)])).collect();
@@ -157,26 +157,30 @@ fn equal(candidates: &[Candidate<'_>]) -> Vec<Vec<(usize, usize)>> {
 /// largest groups first.
 fn grouped(pairs: impl Iterator<Item = [(usize, usize); 2]>, statistics: &Statistics) -> String {
     const NAMED: usize = 6;
-    let mut groups: BTreeMap<[Place; 2], Vec<[(usize, usize); 2]>> = BTreeMap::new();
+    let mut groups: BTreeMap<[ImageSelection; 2], Vec<[(usize, usize); 2]>> = BTreeMap::new();
     for pair in pairs {
         let [a, b] = pair;
         let key = match (a.0 == b.0, a.1 == b.1) {
-            (false, true) => [a, b].map(|(view, _)| Place::view(view)),
-            (true, false) => [a, b].map(|(_, light)| Place::light(light)),
-            _ => [a, b].map(|(view, light)| Place::image(view, light)),
+            (false, true) => [a, b].map(|(view, _)| ImageSelection::view(view)),
+            (true, false) => [a, b].map(|(_, light)| ImageSelection::light(light)),
+            _ => [a, b].map(|(view, light)| ImageSelection::image(view, light)),
         };
         groups.entry(key).or_default().push(pair);
     }
     let mut groups: Vec<_> = groups.into_iter().collect();
     groups.sort_by_key(|(_, pairs)| std::cmp::Reverse(pairs.len()));
-    let told = |key: &[Place; 2], pairs: &[[(usize, usize); 2]]| {
+    let told = |key: &[ImageSelection; 2], pairs: &[[(usize, usize); 2]]| {
         let [a, b] = key.map(|place| place.named(statistics));
         let [(view, light), _] = pairs[0];
         let shared = match (key[0], pairs.len()) {
-            (Place { light: None, .. }, 1) => format!(" under {}", Place::light(light).named(statistics)),
-            (Place { view: None, .. }, 1) => format!(" from {}", Place::view(view).named(statistics)),
-            (Place { light: None, .. }, count) => format!(" under {}", counted(count, "light")),
-            (Place { view: None, .. }, count) => format!(" from {}", counted(count, "view")),
+            (ImageSelection { light: None, .. }, 1) => {
+                format!(" under {}", ImageSelection::light(light).named(statistics))
+            }
+            (ImageSelection { view: None, .. }, 1) => {
+                format!(" from {}", ImageSelection::view(view).named(statistics))
+            }
+            (ImageSelection { light: None, .. }, count) => format!(" under {}", counted(count, "light")),
+            (ImageSelection { view: None, .. }, count) => format!(" from {}", counted(count, "view")),
             _ => String::new(),
         };
         format!("{a} and {b}{shared}")

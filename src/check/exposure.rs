@@ -9,7 +9,7 @@ use std::collections::HashSet;
 use serde_json::json;
 
 use super::angular::{Alike, Neighbourhood, angle};
-use super::finding::{Check, Finding, Place, Severity, confidence, listed, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, confidence, listed, names, round};
 use super::statistics::{Statistics, deviation, median};
 use crate::words::counted;
 
@@ -117,7 +117,7 @@ fn smaller(a: f64, b: f64) -> f64 {
 }
 
 /// Looks for jumps; images in `explained` have other faults and are left out.
-pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
+pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Check {
     let (near_lights, near_views) =
         (Neighbourhood::new(&statistics.lights), Neighbourhood::new(&statistics.views));
     if !dense(&near_lights, statistics.lights.len()) {
@@ -134,20 +134,20 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
     let by_light = levels.residuals(&near_lights, true);
     let (light_jumps, worst_light) = whole(&levels, &by_light, true);
     let mut findings = Vec::new();
-    findings.extend(whole_finding(statistics, "light-exposure", &light_jumps, Place::light));
+    findings.extend(whole_finding(statistics, "light-exposure", &light_jumps, ImageSelection::light));
     let mut alarm = worst_light;
     let mut detail = format!("lights at most {:.0} % of the alarm", 100.0 * worst_light);
     if dense(&near_views, statistics.views.len()) {
         let by_view = levels.residuals(&near_views, false);
         let (view_jumps, worst_view) = whole(&levels, &by_view, false);
-        findings.extend(whole_finding(statistics, "view-exposure", &view_jumps, Place::view));
+        findings.extend(whole_finding(statistics, "view-exposure", &view_jumps, ImageSelection::view));
         let jumped = |at: usize| {
             light_jumps.iter().any(|jump| jump.0 == at % levels.lights)
                 || view_jumps.iter().any(|jump| jump.0 == at / levels.lights)
         };
         let residuals = [centred(&levels, by_light, true), centred(&levels, by_view, false)];
         let (images, worst_image) = images(statistics, &levels, &residuals, |at| {
-            let place = Place::image(at / levels.lights, at % levels.lights);
+            let place = ImageSelection::image(at / levels.lights, at % levels.lights);
             jumped(at) || explained.contains(&place)
         });
         findings.extend(image_finding(statistics, &images));
@@ -198,7 +198,7 @@ fn images(
     levels: &Levels,
     residuals: &[Vec<f64>; 2],
     skip: impl Fn(usize) -> bool,
-) -> (Vec<(Place, f64)>, f64) {
+) -> (Vec<(ImageSelection, f64)>, f64) {
     let alike = Alike::new(&statistics.views, &statistics.lights);
     let [by_light, by_view] = residuals.each_ref().map(|residuals| alike.contrast(residuals));
     let partners = partners(statistics);
@@ -219,7 +219,7 @@ fn images(
         }
         worst = worst.max(share);
         if share > 1.0 {
-            found.push((Place::image(view, light), jump));
+            found.push((ImageSelection::image(view, light), jump));
         }
     }
     found.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
@@ -245,15 +245,16 @@ fn whole_finding(
     statistics: &Statistics,
     code: &'static str,
     jumps: &[(usize, f64)],
-    place: fn(usize) -> Place,
+    place: fn(usize) -> ImageSelection,
 ) -> Option<Finding> {
-    let places: Vec<(Place, f64)> = jumps.iter().map(|&(number, jump)| (place(number), jump.exp())).collect();
+    let places: Vec<(ImageSelection, f64)> =
+        jumps.iter().map(|&(number, jump)| (place(number), jump.exp())).collect();
     let largest = jumps.iter().map(|(_, jump)| jump.abs()).fold(0.0, f64::max);
     finding(statistics, code, &places, largest / JUMP)
 }
 
-fn image_finding(statistics: &Statistics, jumps: &[(Place, f64)]) -> Option<Finding> {
-    let places: Vec<(Place, f64)> = jumps.iter().map(|&(place, jump)| (place, jump.exp())).collect();
+fn image_finding(statistics: &Statistics, jumps: &[(ImageSelection, f64)]) -> Option<Finding> {
+    let places: Vec<(ImageSelection, f64)> = jumps.iter().map(|&(place, jump)| (place, jump.exp())).collect();
     let largest = jumps.iter().map(|(_, jump)| jump.abs()).fold(0.0, f64::max);
     finding(statistics, "image-exposure", &places, largest / IMAGE_JUMP)
 }
@@ -261,11 +262,11 @@ fn image_finding(statistics: &Statistics, jumps: &[(Place, f64)]) -> Option<Find
 fn finding(
     statistics: &Statistics,
     code: &'static str,
-    factors: &[(Place, f64)],
+    factors: &[(ImageSelection, f64)],
     times: f64,
 ) -> Option<Finding> {
     let (_, first) = factors.first()?;
-    let places: Vec<Place> = factors.iter().map(|(place, _)| *place).collect();
+    let places: Vec<ImageSelection> = factors.iter().map(|(place, _)| *place).collect();
     Some(Finding {
         code,
         severity: Severity::Fault,

@@ -29,14 +29,14 @@ pub enum Severity {
 
 /// The image, or all images of a view or a light, that a finding is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-pub struct Place {
+pub struct ImageSelection {
     /// Number of the view; all views if there is none.
     pub view: Option<usize>,
     /// Number of the light; all lights if there is none.
     pub light: Option<usize>,
 }
 
-impl Place {
+impl ImageSelection {
     /// One image.
     pub fn image(view: usize, light: usize) -> Self {
         Self { view: Some(view), light: Some(light) }
@@ -80,7 +80,7 @@ pub struct Finding {
     /// The option of `btf import` that repairs it, if there is one.
     pub repair: Option<String>,
     /// Where.
-    pub directions: Vec<Place>,
+    pub directions: Vec<ImageSelection>,
 }
 
 /// One question asked of the data and its answer.
@@ -92,8 +92,8 @@ pub struct Check {
     pub state: State,
     /// What was measured, or why nothing was.
     pub detail: String,
-    /// The worst value measured as a share of the one that raises the alarm: below 1 where nothing was found, else from 1
-    /// to [`MOST_ALARM`], which stands for all that is more.
+    /// The worst value measured as a share of the one that raises the alarm: below 1 where nothing was found, else from
+    /// 1 to [`MOST_ALARM`], which stands for all that is more.
     pub alarm: Option<f64>,
     /// What was found.
     pub findings: Vec<Finding>,
@@ -150,7 +150,7 @@ pub(super) fn round(value: f64, decimals: i32) -> f64 {
 }
 
 /// The names of places, the first few of them.
-pub(super) fn names(places: &[Place], statistics: &Statistics) -> String {
+pub(super) fn names(places: &[ImageSelection], statistics: &Statistics) -> String {
     const NAMED: usize = 6;
     let mut names: Vec<String> = places.iter().take(NAMED).map(|place| place.named(statistics)).collect();
     if places.len() > NAMED {
@@ -160,7 +160,7 @@ pub(super) fn names(places: &[Place], statistics: &Statistics) -> String {
 }
 
 /// Places and a number of each, as evidence.
-pub(super) fn listed(places: &[(Place, f64)]) -> Value {
+pub(super) fn listed(places: &[(ImageSelection, f64)]) -> Value {
     const LISTED: usize = 100;
     places
         .iter()

@@ -1,8 +1,8 @@
 //! Images under wrong names: exchanged, or from another direction.
 //!
-//! What an image shows beyond what all images show (its relief under its own light) changes smoothly with the directions, so
-//! the images of neighbouring lights and views predict its pattern. An image that looks like neither, and like
-//! the neighbourhood of another place, belongs there.
+//! What an image shows beyond what all images show (its relief under its own light) changes smoothly with the
+//! directions, so the images of neighbouring lights and views predict its pattern. An image that looks like neither,
+//! and like the neighbourhood of another place, belongs there.
 
 use std::collections::HashSet;
 
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::{Alike, Neighbourhood, angle};
-use super::finding::{Check, Finding, Place, Severity, confidence, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, confidence, names, round};
 use super::statistics::{Statistics, median};
 
 /// Name of the check.
@@ -28,7 +28,8 @@ const LEAST_CONTRAST: f64 = 0.03;
 /// An image is suspected if it correlates with its neighbours' prediction less than this ...
 const MISFIT: f64 = 0.7;
 
-/// ... and less than images of like geometry do by this many times their deviation (never taken for less than the floor).
+/// ... and less than images of like geometry do by this many times their deviation (never taken for less than the
+/// floor).
 const TIMES: f64 = 5.0;
 const FLOOR: f64 = 0.04;
 
@@ -108,7 +109,7 @@ struct Fit {
 }
 
 /// Looks for them; images in `explained` have other faults.
-pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
+pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Check {
     let (near_lights, near_views) =
         (Neighbourhood::new(&statistics.lights), Neighbourhood::new(&statistics.views));
     for (what, near, count) in
@@ -139,7 +140,7 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
         .collect();
     let own: Vec<f64> = fits.iter().map(|fit| fit.own).collect();
     let contrasts = Alike::new(&statistics.views, &statistics.lights).contrast(&own);
-    let place = |at: usize| Place::image(at / patterns.lights, at % patterns.lights);
+    let place = |at: usize| ImageSelection::image(at / patterns.lights, at % patterns.lights);
     let mut suspects: Vec<usize> = (0..own.len())
         .filter(|&at| {
             let (less, spread) = contrasts[at];
@@ -151,7 +152,8 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
     let Verdict { exchanged, moved, nearest } = judge(statistics, &patterns, &fits, &suspects);
     let mut findings = Vec::new();
     if !exchanged.is_empty() {
-        let places: Vec<Place> = exchanged.iter().flat_map(|&(a, b, _)| [place(a), place(b)]).collect();
+        let places: Vec<ImageSelection> =
+            exchanged.iter().flat_map(|&(a, b, _)| [place(a), place(b)]).collect();
         let pairs: Vec<_> = exchanged
             .iter()
             .map(|&(a, b, there)| json!({"images": [place(a), place(b)], "fit_own": [round(own[a], 3), round(own[b], 3)], "fit_exchanged": round(there, 3)}))
@@ -171,7 +173,7 @@ pub fn check(statistics: &Statistics, explained: &HashSet<Place>) -> Check {
         });
     }
     if !moved.is_empty() {
-        let places: Vec<Place> = moved.iter().map(|&(at, ..)| place(at)).collect();
+        let places: Vec<ImageSelection> = moved.iter().map(|&(at, ..)| place(at)).collect();
         let list: Vec<_> = moved
             .iter()
             .map(|&(at, to, there)| json!({"image": place(at), "fits_at": place(to), "fit_own": round(own[at], 3), "fit_there": round(there, 3)}))
@@ -227,14 +229,14 @@ fn judge(statistics: &Statistics, patterns: &Patterns, fits: &[Fit], suspects: &
         }
     }
     pairs.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let mut settled = HashSet::new();
+    let mut explained = HashSet::new();
     for (a, b, there) in pairs {
-        if !settled.contains(&a) && !settled.contains(&b) {
-            settled.extend([a, b]);
+        if !explained.contains(&a) && !explained.contains(&b) {
+            explained.extend([a, b]);
             verdict.exchanged.push((a, b, there));
         }
     }
-    for &at in suspects.iter().filter(|at| !settled.contains(at)) {
+    for &at in suspects.iter().filter(|at| !explained.contains(at)) {
         let best = (0..fits.len())
             .filter(|&to| far(statistics, patterns.lights, at, to))
             .map(|to| (to, at_place(at, to)))

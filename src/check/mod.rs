@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::run::Context;
-pub use finding::{Check, Finding, Place, Severity, State};
+pub use finding::{Check, Finding, ImageSelection, Severity, State};
 use source::Views;
 pub use statistics::Statistics;
 
@@ -51,7 +51,7 @@ impl Report {
 /// Reads a source once and examines it; the statistics are handed back for pictures.
 ///
 /// # Errors
-/// What the source fails with, or [`crate::Kind::Stopped`].
+/// What the source fails with, or [`crate::ErrorKind::Stopped`].
 pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Report)> {
     let statistics = statistics::gather(source, context)?;
     let report = context.compute(|| examine(&statistics));
@@ -118,7 +118,7 @@ fn has_fault(checks: &[Check], name: &str) -> bool {
 }
 
 /// Places that the findings of the named checks are about.
-fn explained(checks: &[Check], names: &[&str]) -> HashSet<Place> {
+fn explained(checks: &[Check], names: &[&str]) -> HashSet<ImageSelection> {
     checks
         .iter()
         .filter(|check| names.contains(&check.name))

@@ -1,14 +1,14 @@
 //! Do the views lie on each other?
 //!
-//! Images are rectified to the plane, so that the mean images of neighbouring views show one texture at one place. Parallax moves what
-//! lies above the plane one way and what lies below the other, a view that was rectified badly moves as a whole against all its
-//! neighbours.
+//! Images are rectified to the plane, so that the mean images of neighbouring views show one texture at one place.
+//! Parallax moves what lies above the plane one way and what lies below the other, a view that was rectified badly
+//! moves as a whole against all its neighbours.
 
 use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::Neighbourhood;
-use super::finding::{Check, Finding, Place, Severity, confidence, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, confidence, names, round};
 use super::plane::{Plane, displacement};
 use super::statistics::{Statistics, median};
 
@@ -154,7 +154,8 @@ fn offset(pictures: &[Plane], near: &Neighbourhood, view: usize) -> Option<Offse
 
 fn finding(statistics: &Statistics, displaced: &[(usize, &Offset, f64)]) -> Option<Finding> {
     let &(first, offset, times) = displaced.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let places: Vec<Place> = displaced.iter().map(|&(view, ..)| Place::view(view)).collect();
+    let places: Vec<ImageSelection> =
+        displaced.iter().map(|&(view, ..)| ImageSelection::view(view)).collect();
     let list: Vec<_> = displaced
         .iter()
         .map(|(view, offset, _)| {

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::finding::{Check, Finding, Place, Severity, confidence, listed, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, confidence, listed, names, round};
 use super::statistics::Statistics;
 use crate::words::counted;
 
@@ -36,16 +36,16 @@ fn places(statistics: &Statistics) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Images for which `value` is above 0, the largest values first.
-fn ranked(statistics: &Statistics, value: impl Fn(usize, usize) -> f64) -> Vec<(Place, f64)> {
-    let mut found: Vec<(Place, f64)> = places(statistics)
-        .map(|(view, light)| (Place::image(view, light), value(view, light)))
+fn ranked(statistics: &Statistics, value: impl Fn(usize, usize) -> f64) -> Vec<(ImageSelection, f64)> {
+    let mut found: Vec<(ImageSelection, f64)> = places(statistics)
+        .map(|(view, light)| (ImageSelection::image(view, light), value(view, light)))
         .filter(|(_, value)| *value > 0.0)
         .collect();
     found.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     found
 }
 
-fn only(ranked: &[(Place, f64)]) -> Vec<Place> {
+fn only(ranked: &[(ImageSelection, f64)]) -> Vec<ImageSelection> {
     ranked.iter().map(|(place, _)| *place).collect()
 }
 
@@ -100,9 +100,9 @@ pub fn numbers(statistics: &Statistics) -> Check {
 
 /// Looks for images on which nothing was photographed.
 pub fn black(statistics: &Statistics) -> Check {
-    let found: Vec<Place> = places(statistics)
+    let found: Vec<ImageSelection> = places(statistics)
         .filter(|&(view, light)| statistics.is_black(view, light))
-        .map(|(view, light)| Place::image(view, light))
+        .map(|(view, light)| ImageSelection::image(view, light))
         .collect();
     let darkest = statistics.darkest();
     let alarm = super::statistics::BLACK / darkest.max(1e-9);
@@ -110,7 +110,7 @@ pub fn black(statistics: &Statistics) -> Check {
     if found.is_empty() {
         return Check::done(BLACK, detail, alarm, Vec::new());
     }
-    let values: Vec<(Place, f64)> = found
+    let values: Vec<(ImageSelection, f64)> = found
         .iter()
         .map(|&place| (place, statistics.image(place.view.unwrap_or(0), place.light.unwrap_or(0)).mean))
         .collect();
@@ -131,18 +131,18 @@ pub fn black(statistics: &Statistics) -> Check {
 /// Looks for images on which nothing is to be seen, though they need not be black. Of a measurement that is `saturated`
 /// images that are clipped are told already.
 pub fn contrast(statistics: &Statistics, saturated: bool) -> Check {
-    let plain: Vec<Place> = places(statistics)
+    let plain: Vec<ImageSelection> = places(statistics)
         .filter(|&(view, light)| statistics.is_plain(view, light))
-        .map(|(view, light)| Place::image(view, light))
+        .map(|(view, light)| ImageSelection::image(view, light))
         .collect();
     let all = statistics.images.len();
     let nothing = plain.len() == all;
     // Single ones that are black, or among many that are clipped, are told as such.
-    let is_told = |place: &Place| {
+    let is_told = |place: &ImageSelection| {
         let (view, light) = (place.view.unwrap_or(0), place.light.unwrap_or(0));
         statistics.is_black(view, light) || (saturated && statistics.clipped_share(view, light) > CLIPPED.0)
     };
-    let plain: Vec<Place> = plain.into_iter().filter(|place| nothing || !is_told(place)).collect();
+    let plain: Vec<ImageSelection> = plain.into_iter().filter(|place| nothing || !is_told(place)).collect();
     let share = plain.len() as f64 / all.max(1) as f64;
     let detail = format!("{} of {} of one brightness throughout", plain.len(), counted(all, "image"));
     if plain.is_empty() {
@@ -157,7 +157,7 @@ pub fn contrast(statistics: &Statistics, saturated: bool) -> Check {
             names(&plain, statistics)
         )
     };
-    let values: Vec<(Place, f64)> = plain
+    let values: Vec<(ImageSelection, f64)> = plain
         .iter()
         .map(|&place| (place, statistics.image(place.view.unwrap_or(0), place.light.unwrap_or(0)).mean))
         .collect();
@@ -192,7 +192,8 @@ pub fn saturation(statistics: &Statistics) -> Check {
         return Check::done(SATURATION, detail, alarm, Vec::new());
     }
     let severity = if share > CLIPPED.1 { Severity::Fault } else { Severity::Suspicion };
-    let many: Vec<(Place, f64)> = of_image.into_iter().filter(|(_, share)| *share > CLIPPED.0).collect();
+    let many: Vec<(ImageSelection, f64)> =
+        of_image.into_iter().filter(|(_, share)| *share > CLIPPED.0).collect();
     let mean = |lights: bool| -> Vec<f64> {
         let (outer, inner) = if lights {
             (statistics.lights.len(), statistics.views.len())

@@ -8,12 +8,12 @@ use btfkit::store::model::appearance::AppearanceReport;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 
 /// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
 const FEW_CELLS: u64 = 4;
 
-/// Prepare a model for `btf enlarge`: how the surroundings of each texel look
+/// Prepare a model for `btf enlarge`: describe how the surroundings of each texel look
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -22,7 +22,8 @@ Example:
 pub(super) struct Appearance {
     /// The model with the clusters
     model: PathBuf,
-    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    /// Steps from cell to cell of a regular material, in texels: dy,dx;dy,dx (weaves), dy,dx (ribs), none, or auto
+    /// (found in the pictures)
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     lattice: LatticeChoice,
     /// Print what would be done, and do nothing
@@ -31,13 +32,13 @@ pub(super) struct Appearance {
 }
 
 impl Appearance {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = appearance_plan(&self.model, &self.lattice)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_appearance(&plan.run(context)?, tell.found(found));
+        print_appearance(&plan.run(context)?, console.found(found));
         Ok(())
     }
 }
@@ -46,7 +47,7 @@ pub(super) fn appearance_plan(model: &Path, lattice: &LatticeChoice) -> Result<a
     appearance::plan(&appearance::Options { model: model.into(), lattice: *lattice })
 }
 
-pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
+pub(super) fn print_appearance(report: &AppearanceReport, console: Console) {
     let [_, _, height, width] = report.exemplar;
     let coarsest = report.levels.last().map_or(1, |level| level.spacing);
     let levels = counted(report.levels.len(), "level");
@@ -58,16 +59,16 @@ pub(super) fn tell_appearance(report: &AppearanceReport, tell: Tell) {
         (found, 1) => format!("ribs, a period of {found} texels (rows, columns), {cells} of them"),
         (found, _) => format!("lattice of {found} texels (rows, columns), {cells} cells"),
     };
-    if tell.brief {
-        tell.stage("exemplar", &format!("{width}x{height}; {lattice}"));
+    if console.brief {
+        console.stage("exemplar", &format!("{width}x{height}; {lattice}"));
     } else {
         let text = format!("{width}x{height}, described at {levels}, 1 to {coarsest} texels apart");
-        tell.stage("exemplar", &text);
-        tell.line(format!("          {lattice}"));
+        console.stage("exemplar", &text);
+        console.line(format!("          {lattice}"));
     }
     let fewest = counts.fewest_in_a_direction();
     if !report.lattice.is_empty() && fewest < FEW_CELLS {
-        tell.line(format!(
+        console.line(format!(
             "          only {fewest} in a direction: large pieces of an enlargement will be copies; measure a larger part if you can, or let it bend by --lattice none"
         ));
     }

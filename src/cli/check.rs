@@ -12,38 +12,40 @@ use clap::Args;
 use serde_json::Value;
 
 use super::each::{Ended, Line, Outcome, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json};
+use super::{Console, as_json};
 
-/// Find faults in a measurement: swapped or mirrored directions, wrong curves, black, duplicate or misplaced images
+/// Look for mistakes of a measurement: swapped or mirrored directions, a wrong gamma, black, duplicate or misplaced
+/// images
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf check wood.zarr
   btf check UBO_WOOD256.zip --picture wood.png
-  btf check felt.btf --azimuth mirrored             does this option repair it?
+  btf check felt.btf --azimuth mirrored             see whether this option repairs it
   btf check archives/*                              one line each, and a count
 The exit code is 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
-    /// Measurements and archives; with several, each gets one line
+    /// Measurements and archives; if there are several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Take the archives for pieces of one measurement
+    /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Also draw what was measured on one sheet: .png, .jpg, .webp or .tif
+    /// Also write one picture with all that was found: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print everything as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 impl Check {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         if self.paths.len() > 1 && !self.pieces {
             if self.picture.is_some() {
@@ -51,14 +53,16 @@ impl Check {
                     .hint("check one at a time for a sheet, or say --pieces if they are one measurement"));
             }
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, self.json, context, tell, |path| self.one_of_many(path, context));
+            return each(&self.paths, name, self.json, context, console, |path| {
+                self.one_of_many(path, given, context)
+            });
         }
-        let Examined { statistics, report, notes } = self.examine(&self.paths, context)?;
+        let Examined { statistics, report, notes } = self.examine(&self.paths, given, context)?;
         if self.json {
-            tell.plan(&with_notes(&report, &notes)?)?;
+            console.plan(&with_notes(&report, &notes)?)?;
         } else {
-            tell_report(&report, tell);
-            tell.notes(&notes);
+            print_report(&report, console);
+            console.notes(&notes);
         }
         if let Some(path) = &self.picture {
             let findings: Vec<&Finding> = report.findings().collect();
@@ -68,15 +72,15 @@ impl Check {
     }
 
     /// Examines one input, which may lie in pieces.
-    fn examine(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Examined> {
+    fn examine(&self, paths: &[PathBuf], given: &Given, context: &Context<'_>) -> Result<Examined> {
         let path = first(paths);
         if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
+            given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
             // One that was made by an older version, or crafted, may not say how it was read.
-            let attributes = measurement.attributes()?;
-            let reading = attributes.get("recipe").and_then(|recipe| recipe.get("reading")).cloned();
-            report.beside(&serde_json::from_value(reading.unwrap_or_default()).unwrap_or_default());
+            let reading = measurement.recipe().reading.clone();
+            report.beside(&serde_json::from_value(reading).unwrap_or_default());
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;
@@ -86,8 +90,8 @@ impl Check {
         Ok(Examined { statistics, report, notes: btfkit::archive::notes(source.as_ref()) })
     }
 
-    fn one_of_many(&self, path: &PathBuf, context: &Context<'_>) -> Result<Outcome> {
-        let Examined { report, notes, .. } = self.examine(std::slice::from_ref(path), context)?;
+    fn one_of_many(&self, path: &PathBuf, given: &Given, context: &Context<'_>) -> Result<Outcome> {
+        let Examined { report, notes, .. } = self.examine(std::slice::from_ref(path), given, context)?;
         let suspected: Vec<&str> = report.findings().map(|finding| finding.code).collect();
         let line = if self.json {
             Line::Json(with_notes(&report, &notes)?)
@@ -141,7 +145,7 @@ fn open(path: &Path) -> Result<Measurement> {
     Ok(measurement)
 }
 
-fn tell_report(report: &Report, tell: Tell) {
+fn print_report(report: &Report, console: Console) {
     let mut rows = vec![row!["check", "result", "of alarm", ""]];
     for check in &report.checks {
         let state = match check.state {
@@ -155,15 +159,15 @@ fn tell_report(report: &Report, tell: Tell) {
         });
         rows.push(row![check.name, state, alarm, check.detail]);
     }
-    tell.text(&table(&rows));
+    console.text(&table(&rows));
     for finding in report.findings() {
         let severity = format!("{:?}", finding.severity).to_lowercase();
-        tell.line("");
-        tell.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
-        tell.line(format!("  {}", finding.message));
-        tell.line(format!("  evidence: {}", evidence(finding)));
+        console.line("");
+        console.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
+        console.line(format!("  {}", finding.message));
+        console.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
-            tell.line(format!("  repair:   btf import ... {repair}"));
+            console.line(format!("  repair:   btf import ... {repair}"));
         }
     }
 }

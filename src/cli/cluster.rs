@@ -10,39 +10,41 @@ use btfkit::stage::import::Shard;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
+use super::given::Given;
 use super::tile::Seed;
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
 #[derive(Args)]
 pub(super) struct ClusterOptions {
-    /// Number of clusters, n_c [default: 256, or as many as the tile has texels]
+    /// Number of clusters [default: 256, or as many as the tile has texels]
     #[arg(long, group = "amount", value_parser = number::count)]
     clusters: Option<usize>,
-    /// Instead: the fewest clusters with a mean weighted |dL*| of at most this
+    /// Instead of --clusters: as few as leave a mean error of at most this, in units of lightness L*
     #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
     error: Option<f64>,
-    /// Instead: as many as make the model this many times smaller than the raw measurement
+    /// Instead of --clusters: as many as make the model N times smaller than the raw measurement
     #[arg(long, group = "amount", value_name = "N", value_parser = number::positive)]
     ratio: Option<f64>,
-    /// Centre of a cluster
+    /// What the centre of a cluster is
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
-    /// Most passes over the texels
-    #[arg(long, default_value_t = Limits::default().passes)]
+    /// Stop after this many passes over the texels
+    #[arg(long, default_value_t = Limits::default().passes, value_parser = number::count)]
     passes: usize,
-    /// Stop when a pass improves the objective by less than this share
+    /// Stop when a pass lowers the error by less than this share
     #[arg(long, default_value_t = Limits::default().tolerance, value_parser = number::share)]
     tolerance: f64,
-    /// How to find the first centres [default: from all texels if they fit in 192 MiB, else sample]
+    /// Where the first centres come from [default: all texels if they fit in 192 MiB, otherwise a sample]
     #[arg(long, value_enum)]
     first: Option<FirstName>,
-    /// Texels in the sample [default: as many as fit in 192 MiB; for mini-batches 16384, or eight for each cluster]
+    /// Number of texels in the sample [default: as many as fit in 192 MiB; for mini-batches 16384, or eight for each
+    /// cluster if that is more]
     #[arg(long, value_name = "TEXELS")]
     sample: Option<usize>,
-    /// Try so many sets of first centres, and go on with the best
+    /// Try N sets of first centres, and go on with the best
     #[arg(long, default_value_t = 1, value_name = "N")]
     restarts: u32,
-    /// Begin no further pass after so many seconds
+    /// Begin no further pass after this many seconds
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile contains this one
@@ -52,7 +54,7 @@ pub(super) struct ClusterOptions {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Centre {
-    /// The median in each direction, with the least sum of absolute differences
+    /// The median for each pair of directions, which has the least sum of absolute differences
     Median,
     /// The mean, as in ordinary k-means
     Mean,
@@ -76,18 +78,18 @@ enum StepName {
     Reduce,
 }
 
-/// Group the texels of a model's tile into clusters whose BRDFs are alike
+/// Sort the texels of a model's tile into clusters of similar BRDFs
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf cluster wood.zarr wood.model.zarr --clusters 400
-  btf cluster wood.zarr wood.model.zarr --error 1.5         the fewest clusters with this mean |dL*|
-  btf cluster wood.zarr wood.model.zarr --ratio 200         a two hundredth of the measurement's size
+  btf cluster wood.zarr wood.model.zarr --error 1.5         as few clusters as leave this mean error
+  btf cluster wood.zarr wood.model.zarr --ratio 200         200 times smaller than the measurement
   btf cluster wood.zarr second.model.zarr --clusters-of wood.model.zarr
 Cluster the whole plane once, and use its clusters for any tile that is cut from it:
   btf tile wood.zarr plane.model.zarr --tile none && btf cluster wood.zarr plane.model.zarr
   btf model wood.zarr wood.model.zarr --clusters-of plane.model.zarr
-Many processes, the same bytes (exit code 66: a step before this one is not finished):
+Share the work between processes (exit code 66: a step before this one is not finished):
   btf cluster wood.zarr plane.model.zarr --step prepare
   btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
   btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
@@ -103,13 +105,13 @@ pub(super) struct Cluster {
     options: ClusterOptions,
     #[command(flatten)]
     seed: Seed,
-    /// Do only one step, where many processes share the work
+    /// Do only one step, so that many processes share the work
     #[arg(long, value_enum, conflicts_with_all = ["clusters_of", "time"])]
     step: Option<StepName>,
     /// Number of the pass, from 0; a pass that is finished is not done again [default: the latest]
     #[arg(long, requires = "step", value_name = "N")]
     pass: Option<usize>,
-    /// Assign only part K of N of the pass
+    /// Assign only part K of N of the texels, K from 0
     #[arg(long, requires = "step", value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
@@ -118,26 +120,43 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
         let Self { measurement, model, options, seed, .. } = self;
+        self.refuse_idle(given)?;
         if self.dry_run {
             return match &options.clusters_of {
-                Some(from) => tell.plan(&taken_plan(model, from)?.summary()),
-                None => tell.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
+                Some(from) => console.plan(&taken_plan(model, from)?.summary()),
+                None => console.plan(&cluster_plan(measurement, model, options, seed.seed)?.summary()),
             };
         }
         let Some(step) = self.step() else {
             let (found, report) = run_clusters(measurement, model, options, seed.seed, context)?;
-            tell_clusters(&report, tell.found(found));
+            print_clusters(&report, console.found(found));
             return Ok(());
         };
         match cluster_plan(measurement, model, options, seed.seed)?.step(step, context)? {
-            Stepped::Done(report) => tell_clusters(&report, tell),
-            Stepped::Next(pass) => tell.line(format!("pass {pass} can begin")),
-            Stepped::Over(pass) => tell.line(format!("pass {pass} is over")),
+            Stepped::Done(report) => print_clusters(&report, console),
+            Stepped::Next(pass) => console.line(format!("pass {pass} can begin")),
+            Stepped::Over(pass) => console.line(format!("pass {pass} is over")),
             Stepped::Assigned { pass, found, written } => {
-                tell.line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
+                console
+                    .line(format!("pass {pass}: {} assigned, {found} found done", counted(written, "part")));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses options that would change nothing.
+    fn refuse_idle(&self, given: &Given) -> Result<()> {
+        match self.step {
+            Some(StepName::Prepare) => given.refuse_these(&["pass", "shard"], "in --step prepare")?,
+            Some(StepName::Reduce) => {
+                given.refuse_these(&["shard"], "in --step reduce, which is one process")?
+            }
+            _ => {}
+        }
+        if self.options.clusters_of.is_some() {
+            given.refuse_these(&["seed"], "beside --clusters-of: nothing is drawn at random")?;
         }
         Ok(())
     }
@@ -181,17 +200,26 @@ fn cluster_plan(
     options: &ClusterOptions,
     seed: u64,
 ) -> Result<cluster::Plan> {
+    cluster::plan(&cluster_options(measurement, model, options, seed))
+}
+
+pub(super) fn cluster_options(
+    measurement: &Path,
+    model: &Path,
+    options: &ClusterOptions,
+    seed: u64,
+) -> cluster::Options {
     let centre = match options.centre {
         Centre::Median => CentreRule::Median,
         Centre::Mean => CentreRule::Mean,
     };
-    let limits = Limits { passes: options.passes.max(1), tolerance: options.tolerance };
+    let limits = Limits { passes: options.passes, tolerance: options.tolerance };
     let amount = match (options.clusters, options.error, options.ratio) {
         (_, Some(error), _) => Amount::Error(error),
         (_, _, Some(ratio)) => Amount::Ratio(ratio),
         (clusters, ..) => clusters.map_or(Amount::Usual, Amount::Clusters),
     };
-    cluster::plan(&cluster::Options {
+    cluster::Options {
         measurement: measurement.into(),
         model: model.into(),
         amount,
@@ -205,10 +233,13 @@ fn cluster_plan(
         restarts: options.restarts,
         seed,
         time: options.time.map(Duration::from_secs),
-    })
+    }
 }
 
-pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
+/// A mean |dL*| above this is seen by everybody.
+const LARGE: f64 = 3.0;
+
+pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let taken = report.taken_from.as_ref();
     let passes = match (report.batches.len(), report.passes.len()) {
@@ -217,37 +248,46 @@ pub(super) fn tell_clusters(report: &cluster::Report, tell: Tell) {
             format!("after {} over mini-batches and {all} over all texels", counted(batches, "pass"))
         }
     };
+    // Told behind the rest, whichever of the two.
+    let tell_error = || {
+        if report.representative_lightness_error > LARGE {
+            console.line("          a large error: more clusters leave less of it (--clusters N; btf curve shows how much)");
+        }
+    };
     let stored = report.representative_bytes + report.index_bytes;
     let ratio = |bytes: u64| bytes as f64 / stored as f64;
-    if tell.brief {
+    if console.brief {
         let error = report.representative_lightness_error;
         let ratio = ratio(report.measurement_bytes);
         let text = format!(
             "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
             report.clusters
         );
-        return tell.stage("clusters", &text);
+        console.stage("clusters", &text);
+        tell_error();
+        return;
     }
     let how = taken
         .map_or(passes, |(name, texels)| format!("of {name}, which clustered {}", counted(*texels, "texel")));
-    tell.stage(
+    console.stage(
         "clusters",
         &format!(
             "{} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
             report.clusters, report.representative_lightness_error
         ),
     );
-    tell.line(format!(
+    console.line(format!(
         "          representatives {:.3} from their centres, at most {:.3}; {} of one texel",
         report.representative_from_centre,
         report.representative_from_centre_most,
         counted(report.single_texel_clusters, "cluster")
     ));
-    tell.line(format!(
+    console.line(format!(
         "size      representatives {} + index {}: 1:{:.1} of the raw tile, 1:{:.0} of the raw measurement",
         bytes_text(report.representative_bytes),
         bytes_text(report.index_bytes),
         ratio(report.tile_bytes),
         ratio(report.measurement_bytes)
     ));
+    tell_error();
 }

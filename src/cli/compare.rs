@@ -1,8 +1,10 @@
 use std::path::PathBuf;
 
 use btfkit::error::{Error, Result};
+use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
+use btfkit::shape::Size;
 use btfkit::stage::{compare, image};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
@@ -10,10 +12,10 @@ use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
-/// Compare a model with its measurement over the tile: errors in lightness and colour
+/// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
 Example:
@@ -27,25 +29,26 @@ pub(super) struct Compare {
     /// or .tif
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Light of the picture: theta,phi in degrees
-    #[arg(long, default_value = "15,0", allow_hyphen_values = true)]
+    /// Direction of the light, theta,phi in degrees: theta from the normal, phi counter-clockwise from the right
+    #[arg(long, requires = "picture", default_value = "15,0", allow_hyphen_values = true)]
     light: Direction,
-    /// View of the picture
-    #[arg(long, default_value = "0,0", allow_hyphen_values = true)]
+    /// Direction of the view, theta,phi in degrees
+    #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// Print the figures as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl Compare {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
-        let report = compare::run(&options, context)?;
+        let (model, measurement) = compare::open(&options)?;
+        let report = compare::run(&model, &measurement, context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
             for errors in report.elevations.iter().chain([&report.all]) {
@@ -58,13 +61,13 @@ impl Compare {
                     format!("{:.2}", errors.ciede2000_95)
                 ]);
             }
-            tell.text(&table(&rows));
-            tell.line(format!(
+            console.text(&table(&rows));
+            console.line(format!(
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
             if report.all.hues_are_lost() {
-                tell.line(format!(
+                console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
                     report.all.ciede2000, report.all.lightness
@@ -72,26 +75,55 @@ impl Compare {
             }
             if report.all.samples_left_out > 0 {
                 let count = counted(report.all.samples_left_out, "sample");
-                tell.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
+                console.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
         match &self.picture {
-            Some(path) => self.side_by_side(context)?.write(path, context.existing).map(|_| ()),
+            Some(path) => {
+                self.side_by_side(&model, &measurement, context)?.write(path, context.existing)?;
+                if !self.json {
+                    let description = measurement.description();
+                    let measured = [&description.views[..], &description.lights];
+                    console.notes(&image::notes_of_directions(measured, self.view, self.light));
+                }
+                Ok(())
+            }
             None => Ok(()),
         }
     }
 
-    fn side_by_side(&self, context: &Context<'_>) -> Result<Picture> {
-        let model = Model::open(&self.model)?;
-        let measurement = Measurement::open(&self.measurement)?;
+    fn side_by_side(
+        &self,
+        model: &Model,
+        measurement: &Measurement,
+        context: &Context<'_>,
+    ) -> Result<Picture> {
         let tile = model.tile()?;
-        let measured = image::of_measured_tile(&measurement, &tile, self.view, self.light, context)?;
-        let colors = image::cluster_colors(&model, self.view, self.light)?;
+        let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
+        let colors = image::cluster_colors(model, self.view, self.light)?;
         let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]
             .map(|picture| picture.magnified(factor));
-        Ok(Picture::side_by_side(&shown, 8))
+        Ok(captioned(&["measured", "model", "difference x 4"], &shown))
     }
+}
+
+/// Pictures of one size side by side, each under its caption.
+fn captioned(captions: &[&str], pictures: &[Picture]) -> Picture {
+    /// Pixels between pictures, and around captions.
+    const GAP: usize = 8;
+    let widths = captions.iter().map(|caption| text_size(1, caption).width);
+    let sizes = pictures.iter().map(|picture| picture.size);
+    let column = widths.chain(sizes.clone().map(|size| size.width)).max().unwrap_or(0);
+    let below = CHARACTER + 2 * GAP;
+    let height = below + sizes.map(|size| size.height).max().unwrap_or(0);
+    let mut sheet = Canvas::new(Size::new(height, pictures.len() * (column + GAP)));
+    for (number, (caption, picture)) in captions.iter().zip(pictures).enumerate() {
+        let left = number * (column + GAP);
+        sheet.text(GAP, left, caption);
+        sheet.put(below, left, picture);
+    }
+    sheet.into_picture()
 }

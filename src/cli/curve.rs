@@ -10,9 +10,9 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::table::{row, table};
-use super::{Tell, bytes_text};
+use super::{Console, bytes_text};
 
-/// Show the error and the compression for each number of clusters
+/// Show the error and the compression that 1, 2, 4, 8 ... clusters would give
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -27,22 +27,22 @@ pub(super) struct Curve {
     measurement: PathBuf,
     /// The model with the tile
     model: PathBuf,
-    /// Also draw a chart: .png, .jpg, .webp or .tif
+    /// Also write a chart: .png, .jpg, .webp or .tif
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print the curve as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
-    /// Most clusters; never more than a quarter of the texels
+    /// The largest number of clusters to try; never more than a quarter of the texels
     #[arg(long, default_value_t = 1024, value_name = "N")]
     most: usize,
-    /// Seed of the first centres and of the sample
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
 }
 
 impl Curve {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.out.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let plan = curve::plan(&curve::Options {
             measurement: self.measurement.clone(),
@@ -56,9 +56,9 @@ impl Curve {
         let curve = plan.run(context)?;
         if self.json {
             let value = serde_json::to_value(&curve).map_err(|error| Error::internal(error.to_string()))?;
-            tell.plan(&value)?;
+            console.plan(&value)?;
         } else {
-            tell_curve(&curve, tell);
+            print_curve(&curve, console);
         }
         if let Some(path) = &self.out {
             curve.chart().draw().write(path, context.existing)?;
@@ -67,7 +67,7 @@ impl Curve {
     }
 }
 
-fn tell_curve(curve: &curve::Curve, tell: Tell) {
+fn print_curve(curve: &curve::Curve, console: Console) {
     let mut rows = vec![row!["clusters", "mean |dL*|", "size", "of raw measurement"]];
     for point in &curve.points {
         rows.push(row![
@@ -77,9 +77,9 @@ fn tell_curve(curve: &curve::Curve, tell: Tell) {
             curve::ratio_text(point.ratio)
         ]);
     }
-    tell.text(&table(&rows));
+    console.text(&table(&rows));
     if curve.sample_texels < curve.tile_texels {
-        tell.line(format!(
+        console.line(format!(
             "of a sample of {} of {}",
             curve.sample_texels,
             counted(curve.tile_texels, "texel")

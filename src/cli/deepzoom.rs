@@ -8,7 +8,8 @@ use btfkit::stage::image::Subject;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
+use super::Console;
+use super::given::Given;
 use super::scene::SceneArgs;
 
 /// JPEG quality of tiles, unless one is given.
@@ -35,7 +36,7 @@ pub(super) struct Deepzoom {
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
-    /// Print what was done as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
@@ -52,6 +53,11 @@ impl Deepzoom {
         self.deepzoom || output.extension().is_some_and(|ending| ending == "dzi")
     }
 
+    /// Refuses options that would change nothing.
+    pub(super) fn refuse_idle(&self, given: &Given, source: &Path) -> Result<()> {
+        self.scene.refuse_idle(given, source, true)
+    }
+
     /// Whether tiles are JPEGs, which have a quality.
     pub(super) fn is_jpeg(&self) -> bool {
         matches!(self.format, TileFormat::Jpeg)
@@ -63,7 +69,7 @@ impl Deepzoom {
         output: &Path,
         quality: Option<u8>,
         context: &Context<'_>,
-        tell: Tell,
+        console: Console,
     ) -> Result<()> {
         let plan = deepzoom::plan(
             &deepzoom::Options {
@@ -82,23 +88,23 @@ impl Deepzoom {
             context,
         )?;
         if self.dry_run {
-            return tell.plan(&plan.summary(context));
+            return console.plan(&plan.summary(context));
         }
         let report = plan.run(context)?;
         if self.json {
             let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
-            return tell.plan(&value);
+            return console.plan(&value);
         }
         let [width, height] = report.size;
-        tell.line(format!(
+        console.line(format!(
             "{}: {width}x{height} in {}; {} written, {} found done",
             output.display(),
             counted(report.levels, "level"),
             counted(report.tiles_written, "tile"),
             report.tiles_found
         ));
-        tell.line(format!("{}: a viewer of it", output.with_extension("html").display()));
-        tell.notes(&report.notes);
+        console.line(format!("{}: a viewer of it", output.with_extension("html").display()));
+        console.notes(&report.notes);
         Ok(())
     }
 }

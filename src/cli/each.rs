@@ -1,18 +1,18 @@
 //! One command over many inputs: a line each, failures told when they happen while the rest goes on, and a count at
 //! the end.
 
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use serde_json::{Map, Value, json};
 
-use super::Tell;
+use super::Console;
 
 /// How a command ended whose failures have been told as they happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ended {
     Done,
     /// What the worst failure was.
-    Failed(Kind),
+    Failed(ErrorKind),
 }
 
 /// What is told of an input.
@@ -31,21 +31,21 @@ pub(super) type Outcome = (Line, Option<Error>);
 /// `as_json` says how the failures of inputs are told that have no line of their own.
 ///
 /// # Errors
-/// [`Kind::Stopped`] alone; what became of the inputs before it has been told.
+/// [`ErrorKind::Stopped`] alone; what became of the inputs before it has been told.
 pub(super) fn each<I>(
     inputs: &[I],
     name: impl Fn(&I) -> String,
     as_json: bool,
     context: &Context<'_>,
-    tell: Tell,
+    console: Console,
     mut work: impl FnMut(&I) -> Result<Outcome>,
 ) -> Result<Ended> {
     let mut failed: Vec<String> = Vec::new();
-    let mut worst: Option<Kind> = None;
+    let mut worst: Option<ErrorKind> = None;
     for (number, input) in inputs.iter().enumerate() {
         let name = name(input);
         let stopped = |error: Error| {
-            tell.count(as_json, &format!("{}, stopped before {name}", count(number, &failed)));
+            console.count(as_json, &format!("{}, stopped before {name}", count(number, &failed)));
             Err(error)
         };
         if let Err(error) = context.check_stop() {
@@ -53,18 +53,20 @@ pub(super) fn each<I>(
         }
         let (line, error) = match work(input) {
             Ok((line, error)) => (Some(line), error),
-            Err(error) if error.kind() == Kind::Stopped => return stopped(error),
+            Err(error) if error.kind() == ErrorKind::Stopped => return stopped(error),
             Err(error) => (None, Some(error)),
         };
         context.progress.pause(&mut || {
             match (&line, &error) {
-                (Some(Line::Text(text)), None) => tell.line(format!("{name}: {text}")),
-                (Some(Line::Json(value)), _) => tell.json_line(&of_json(&name, Some(value), error.as_ref())),
-                (None, Some(_)) if as_json => tell.json_line(&of_json(&name, None, error.as_ref())),
+                (Some(Line::Text(text)), None) => console.line(format!("{name}: {text}")),
+                (Some(Line::Json(value)), _) => {
+                    console.json_line(&of_json(&name, Some(value), error.as_ref()))
+                }
+                (None, Some(_)) if as_json => console.json_line(&of_json(&name, None, error.as_ref())),
                 _ => {}
             }
             if let Some(error) = &error {
-                tell.failure(Some(&name), error);
+                console.failure(Some(&name), error);
             }
         });
         if let Some(error) = error {
@@ -73,7 +75,7 @@ pub(super) fn each<I>(
         }
     }
     context.progress.end();
-    tell.count(as_json, &count(inputs.len(), &failed));
+    console.count(as_json, &count(inputs.len(), &failed));
     Ok(worst.map_or(Ended::Done, Ended::Failed))
 }
 
@@ -101,9 +103,16 @@ fn of_json(name: &str, value: Option<&Value>, error: Option<&Error>) -> Value {
 
 /// Of two kinds of failure the one that a caller has to know of: trouble with the machine or the program comes before
 /// trouble with an input, and that before what was not meant or is not there.
-fn worse(a: Kind, b: Kind) -> Kind {
-    const ORDER: [Kind; 7] =
-        [Kind::Usage, Kind::Missing, Kind::Recipe, Kind::Input, Kind::Io, Kind::Internal, Kind::Stopped];
-    let place = |kind: Kind| ORDER.iter().position(|&other| other == kind);
+fn worse(a: ErrorKind, b: ErrorKind) -> ErrorKind {
+    const ORDER: [ErrorKind; 7] = [
+        ErrorKind::Usage,
+        ErrorKind::Missing,
+        ErrorKind::Recipe,
+        ErrorKind::Input,
+        ErrorKind::Io,
+        ErrorKind::Internal,
+        ErrorKind::Stopped,
+    ];
+    let place = |kind: ErrorKind| ORDER.iter().position(|&other| other == kind);
     if place(a) >= place(b) { a } else { b }
 }

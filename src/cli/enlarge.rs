@@ -13,7 +13,7 @@ use clap::{Args, ValueEnum};
 
 use super::each::{Ended, Line, each};
 use super::outputs::{Naming, Pair};
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
 /// Tiles of a set, unless their number is given.
 const TILES: usize = 4;
@@ -21,7 +21,7 @@ const TILES: usize = 4;
 /// The most outputs that one command makes.
 const MOST_SEEDS: u64 = 1 << 16;
 
-/// Enlarge a model's tile to a texture of any size
+/// Make a surface of any size from a model
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -31,10 +31,10 @@ Examples:
   btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      joins at its own borders
   btf enlarge wood.model.zarr huge.zarr --size 65536x65536 --shard 3/8   one of eight jobs that share the work
   btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of the paper
-  btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    their second baseline
+  btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    two tiles that join each other
   btf enlarge wood.model.zarr quilt.zarr --size 1024x1024 --method quilt image quilting
   btf enlarge models/*.model.zarr --into planes --size 2048x2048         many models, wood.enlarged.zarr and so on
-The same model, method, size and seed give the same bytes, whatever the memory, the threads, the shards and the
+The same model, method, size and seed always give the same bytes, whatever the memory, threads, shards and
 interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
     /// The model, and the enlargement to make [default: the model's name with .enlarged.zarr]; or many models. With
@@ -50,35 +50,35 @@ pub(super) struct Enlarge {
     /// How to enlarge
     #[arg(long, value_enum, default_value = "coherent")]
     method: Method,
-    /// Seed of everything random: another seed gives another piece of the same material. FIRST..LAST makes
-    /// one output for each, the last included
+    /// Seed of all random choices: another seed gives another piece of the same material. FIRST..LAST makes one output
+    /// for each seed, the last included
     #[arg(long, default_value = "1", value_parser = seeds, allow_hyphen_values = true)]
     seed: RangeInclusive<u64>,
     /// Make an output that joins at its own borders (paper: nearly). Its sides must be multiples of a power of two
-    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); sizes that are not
-    /// are refused, with the nearest that are
+    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); for any other size
+    /// the error names the nearest that fit
     #[arg(long)]
     tileable: bool,
-    /// Make only part K of N (not for paper and quilt), so that N jobs share the work, in any order
+    /// Make only part K of N, K from 0, so that N jobs share the work, in any order (all but paper, quilt)
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
-    /// How much pieces are shifted at random, from 0 to 1 (coherent): more repeats less, less fits better [default:
-    /// 0.5, and 0 where the material has a lattice]
+    /// How far pieces are shifted at random, from 0 to 1 (coherent). More repeats less; less fits better [default: 0.5,
+    /// and 0 for regular materials]
     #[arg(long, value_parser = number::share)]
     jitter: Option<f64>,
-    /// Do not store which texel of the tile each texel is (all but paper)
+    /// Do not store the array `source`, which says which texel of the tile each texel is (all but paper)
     #[arg(long)]
     no_source: bool,
-    /// Write normals beside the index: the tile's, or the synthesised ones (paper)
+    /// Also store a normal map: the tile's normals, or (paper) those drawn from the field
     #[arg(long)]
     keep_normals: bool,
     /// Number of tiles that join each other (tiles) [default: 4]
     #[arg(long, value_name = "N")]
     tiles: Option<usize>,
-    /// Number of nearest normals among which one is chosen (paper) [default: 16, or all of a smaller tile]
+    /// Number of nearest normals to choose from (paper) [default: 16, or all of a smaller tile]
     #[arg(long)]
     candidates: Option<usize>,
-    /// Rows computed at a time (paper); affects memory, not the result [default: as many as fit 2 MiB]
+    /// Number of rows computed at a time (paper); changes memory, not the result [default: as many as fit 2 MiB]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     band: Option<u32>,
     /// Print what would be done, and do nothing
@@ -88,32 +88,32 @@ pub(super) struct Enlarge {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Method {
-    /// Pieces of the tile that continue each other; keeps structure
+    /// Continues pieces of the tile so that they fit; keeps structure
     Coherent,
-    /// The method of Filip and Haindl 2007: nearest normals of a random field
+    /// The method of Filip and Haindl 2007: normals from a random field, and the clusters with the nearest normals
     Paper,
-    /// The tile again and again, whatever the seed
+    /// Repeats the tile
     Repeat,
-    /// Several tiles with one common border, laid at random
+    /// Lays several tiles with one common border at random
     Tiles,
-    /// Patches from random places of the tile on a grid, joined along minimum-error paths
+    /// Joins patches from random places of the tile on a grid, along minimum-error paths
     Roller,
-    /// Image quilting (Efros and Freeman 2001): blocks that fit their neighbours, joined along minimum-error paths
+    /// Image quilting (Efros and Freeman 2001): block after block, each chosen to fit
     Quilt,
 }
 
 impl Enlarge {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         self.refuse_options_of_others()?;
         let naming = Naming { reads: model::KIND, ending: Some(".model.zarr"), becomes: ".enlarged.zarr" };
         let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
         if let [pair] = pairs.as_slice() {
-            tell_reports(&self.one(pair, context, tell)?, self.size, tell);
+            print_reports(&self.one(pair, context, console)?, self.size, console);
             return Ok(Ended::Done);
         }
         let name = |pair: &Pair| pair.input.display().to_string();
-        each(&pairs, name, false, context, tell, |pair| {
-            let reports = self.one(pair, context, tell)?;
+        each(&pairs, name, false, context, console, |pair| {
+            let reports = self.one(pair, context, console)?;
             let mut told = Vec::new();
             for report in &reports {
                 told.push(in_short(report, self.size));
@@ -125,7 +125,7 @@ impl Enlarge {
     }
 
     /// Makes the outputs of one model; none where only the plan was asked for.
-    fn one(&self, pair: &Pair, context: &Context<'_>, tell: Tell) -> Result<Vec<Report>> {
+    fn one(&self, pair: &Pair, context: &Context<'_>, console: Console) -> Result<Vec<Report>> {
         let plan = enlarge::plan(&enlarge::Options {
             model: pair.input.clone(),
             output: pair.output.clone(),
@@ -136,7 +136,7 @@ impl Enlarge {
             shard: self.shard,
         })?;
         if self.dry_run {
-            tell.plan(&plan.summary(context))?;
+            console.plan(&plan.summary(context))?;
             return Ok(Vec::new());
         }
         plan.run(context)
@@ -186,17 +186,17 @@ impl Enlarge {
     }
 }
 
-fn tell_reports(reports: &[Report], size: Size, tell: Tell) {
+fn print_reports(reports: &[Report], size: Size, console: Console) {
     for report in reports {
-        tell.line(in_short(report, size));
-        tell.line(format!(
+        console.line(in_short(report, size));
+        console.line(format!(
             "size      index + representatives {}: 1:{:.0} of the raw enlarged BTF of {}",
             bytes_text(report.stored_bytes),
             report.raw_bytes as f64 / report.stored_bytes as f64,
             bytes_text(report.raw_bytes)
         ));
         if let Some(verdict) = &report.verdict {
-            tell_verdict(verdict, tell);
+            print_verdict(verdict, console);
         }
     }
 }
@@ -214,18 +214,18 @@ fn in_short(report: &Report, size: Size) -> String {
 }
 
 /// One line on whether an enlargement looks like its tile, and one for each warning.
-fn tell_verdict(verdict: &Verdict, tell: Tell) {
+fn print_verdict(verdict: &Verdict, console: Console) {
     let copy = match verdict.counted.largest_copy {
         Some(copy) => format!(", largest unbroken copy {:.1} % of the middle", 100.0 * copy),
         None => String::new(),
     };
-    tell.line(format!(
+    console.line(format!(
         "likeness  {:.0} % of the clusters' shares as in the tile, repetition {:+.2}{copy}",
         100.0 * verdict.counted.shares,
         verdict.excess_peak
     ));
     for warning in &verdict.warnings {
-        tell.line(format!("warning   {warning}"));
+        console.line(format!("warning   {warning}"));
     }
 }
 

@@ -1,46 +1,49 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
+use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::stage::export::{self, Format};
 use btfkit::store::measurement::Measurement;
 use clap::{Args, ValueEnum};
 
 use super::deepzoom::Deepzoom;
-use super::{Tell, bytes_text, found};
+use super::given::Given;
+use super::{Console, bytes_text, found};
 
-/// Write a measurement as an archive (zip, EXR, PNG, HDF5, npy, Bonn), or a picture as Deep Zoom tiles
+/// Where it is said which options have an effect.
+const WHICH: &str = "; btf export --help says which options are for which formats";
+
+/// Write a measurement for other programs (zip, EXR, PNG, HDF5, npy, Bonn), or a picture to zoom into (Deep Zoom)
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
-  btf export wood.zarr wood.npy                       for numpy: [view, light, y, x, channel], and two arrays of directions
+  btf export wood.zarr wood.npy                       for numpy, with two arrays of directions
   btf export wood.zarr wood.h5                        for h5py and MATLAB
   btf export wood.zarr wood-exr --to exr              a folder of linear pictures
   btf export wood.zarr wood.zip --quality 95          JPEGs named as in UBO2003 (lossy)
-  btf export wood.zarr wood.btf --rank 100            for viewers of Bonn's containers; without --rank it is exact, and as large as the raw data
+  btf export wood.zarr wood.btf --rank 100            for Bonn's viewers; exact, but large, without --rank
   btf export wood-4k.zarr wood.dzi --deepzoom --light 60,90 --format jpeg
                                                       tiles for OpenSeadragon and others, and wood.html to look at them
-Importing an export gives the same samples where the format is lossless: npy, PNG, HDF5, EXR and exact containers of halves or floats.
-Tiles show measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the same command again.")]
+Lossless are npy, PNG, HDF5, and EXR and Bonn's containers of halves or floats: importing them gives the same samples.
+Deep Zoom shows measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the
+same command again.")]
 pub(super) struct Export {
     /// The measurement; with --deepzoom also a model or an enlargement
     store: PathBuf,
     /// The file or folder to make
     output: PathBuf,
-    /// Format [default: by the name: .zip UBO2003, .npy, .h5 or .hdf5, .btf DFMF, .dzi Deep Zoom]
+    /// Format [default: by the ending of the name: .zip (UBO2003), .npy, .h5 or .hdf5, .btf (DFMF), .dzi (Deep Zoom)]
     #[arg(long, value_enum, conflicts_with = "deepzoom")]
     to: Option<FormatName>,
-    /// Components to keep in a Bonn container [default: all, which is exact]
+    /// Number of components to keep in a Bonn container [default: all, which is exact]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..))]
     rank: Option<u32>,
-    /// JPEG quality [default: 100, for tiles 90]
+    /// Quality of JPEGs, 1 to 100 [default: 100, for Deep Zoom tiles 90]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
     #[command(flatten)]
     deepzoom: Deepzoom,
-    /// The options that were given, by their names.
-    #[arg(skip)]
-    given: Vec<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -55,27 +58,17 @@ enum FormatName {
 }
 
 impl Export {
-    /// Takes note of the options that were given on the command line.
-    pub(super) fn note_given(&mut self, given: Vec<String>) {
-        self.given = given;
+    /// Whether the same command goes on where it was stopped: tiles are kept.
+    pub(super) fn goes_on(&self) -> bool {
+        self.to.is_none() && self.deepzoom.is_meant(&self.output)
     }
 
-    /// Refuses options that would change nothing.
-    fn refuse_idle(&self, what: &str, is_idle: impl Fn(&str) -> bool) -> Result<()> {
-        match self.given.iter().find(|name| is_idle(name)) {
-            None => Ok(()),
-            Some(name) => {
-                Err(Error::usage(format!("--{} changes nothing in {what}", name.replace('_', "-")))
-                    .hint("leave it out; btf export --help says which options are for which formats"))
-            }
-        }
-    }
-
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
-        if self.to.is_none() && self.deepzoom.is_meant(&self.output) {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
+        if self.goes_on() {
             let is_idle = |name: &str| name == "rank" || name == "quality" && !self.deepzoom.is_jpeg();
-            self.refuse_idle("a Deep Zoom pyramid like this one", is_idle)?;
-            return self.deepzoom.run(&self.store, &self.output, self.quality, context, tell);
+            given.refuse(is_idle, "in a Deep Zoom pyramid like this one", WHICH)?;
+            self.deepzoom.refuse_idle(given, &self.store)?;
+            return self.deepzoom.run(&self.store, &self.output, self.quality, context, console);
         }
         let format = match self.to {
             Some(FormatName::Ubo2003) => Format::Ubo2003,
@@ -86,8 +79,19 @@ impl Export {
             Some(FormatName::Dfmf) => Format::Dfmf,
             Some(FormatName::Fmf) => Format::Fmf,
             None => of_name(&self.output).ok_or_else(|| {
-                Error::new(Kind::Usage, format!("{}: no format goes by this name", self.output.display()))
-                    .hint("--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf")
+                let error = Error::new(
+                    ErrorKind::Usage,
+                    format!("{}: no format goes by this name", self.output.display()),
+                );
+                let formats = "--to says which: ubo2003, exr, png, npy, hdf5, dfmf, fmf";
+                match Ending::of(&self.output, &Ending::ALL) {
+                    Ok(_) => error.hint(format!(
+                        "one picture: btf image {} --out {}; all of a measurement: {formats}",
+                        self.store.display(),
+                        self.output.display()
+                    )),
+                    Err(_) => error.hint(formats),
+                }
             })?,
         };
         if self.output.extension().is_some_and(|ending| ending == "dzi") {
@@ -103,11 +107,9 @@ impl Export {
             Format::Npy => ("a numpy array", ""),
             Format::Hdf5 => ("an HDF5 file", ""),
         };
-        let zoom = Deepzoom::augment_args(clap::Command::new(""));
-        self.refuse_idle(what, |name| {
-            ["rank", "quality"].contains(&name) && name != used
-                || zoom.get_arguments().any(|argument| argument.get_id() == name)
-        })?;
+        let is_idle = |name: &str| ["rank", "quality"].contains(&name) && name != used;
+        given.refuse(is_idle, &format!("in {what}"), WHICH)?;
+        given.refuse_all::<Deepzoom>(&format!("in {what}"), WHICH)?;
         let measurement = Measurement::open(&self.store)?;
         let options = export::Options {
             output: self.output.clone(),
@@ -116,8 +118,13 @@ impl Export {
             quality: self.quality.unwrap_or(100),
         };
         let report = export::run(&measurement, &options, context)?;
-        tell.line(format!("{}: {}{}", self.output.display(), bytes_text(report.bytes), found(report.made)));
-        tell.notes(&report.warnings);
+        console.line(format!(
+            "{}: {}{}",
+            self.output.display(),
+            bytes_text(report.bytes),
+            found(report.made)
+        ));
+        console.notes(&report.warnings);
         Ok(())
     }
 }

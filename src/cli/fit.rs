@@ -12,24 +12,24 @@ use btfkit::store::model::field::FieldReport;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
-/// Fit a random field to a model's normal map, for `btf enlarge --method paper`
+/// Fit a random field to a model's normal map; needed for `btf enlarge --method paper` only
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf fit wood.model.zarr
   btf fit wood.model.zarr --mrf 2d --field slopes --report wood-field
   btf fit wood.model.zarr --gains none --marginals none           the paper as it is written
---report NAME synthesises 512x512 normals and writes how like the tile's they are: the distribution of each
-component, autocorrelation and spread in each band of the pyramid, as NAME.txt and NAME.png.")]
+--report NAME draws 512x512 normals from the field and compares them with those of the tile: the distribution of each
+component, autocorrelation, and the spread in each band of the pyramid. It writes NAME.txt and NAME.png.")]
 pub(super) struct Fit {
     /// The model with the normal map
     model: PathBuf,
     #[command(flatten)]
     options: FitOptions,
-    /// Compare a synthesis with the tile, and write the result to NAME.txt and NAME.png
+    /// Also draw normals from the field, compare them with the tile's, and write NAME.txt and NAME.png
     #[arg(long, value_name = "NAME")]
     report: Option<PathBuf>,
     /// Print what would be done, and do nothing
@@ -39,26 +39,26 @@ pub(super) struct Fit {
 
 #[derive(Args)]
 pub(super) struct FitOptions {
-    /// Random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
+    /// Kind of random field: all channels together (3d), or one by one after a Karhunen-Loeve transform (2d)
     #[arg(long, value_enum, default_value = "3d")]
-    mrf: Kind,
-    /// Levels of the pyramid [default: 1 to 5, whichever keeps the autocovariance best]
+    mrf: CarKind,
+    /// Number of levels of the pyramid [default: 1 to 5, the one that keeps the autocovariance best]
     #[arg(long)]
     levels: Option<usize>,
-    /// What to model: the three components of the normals, or two slopes
+    /// What the field describes: the three components of the normals, or two slopes
     #[arg(long, value_enum, default_value = "normals")]
     field: Field,
-    /// Variance of each level: matched, so that the sum of all levels has that of the tile; or none, as estimated
+    /// How to scale levels: matched, so that their sum varies as much as the tile does; or none, as in the paper
     #[arg(long, value_enum, default_value = "matched")]
     gains: Gains,
-    /// Which distribution of the tile's normals a synthesis keeps: the joint one of n_x and n_y, that of each, or none,
-    /// as in the paper
+    /// Which distribution of the tile's normals is kept: the joint one of n_x and n_y (joint), that of each (channel),
+    /// or neither, as in the paper (none)
     #[arg(long, value_enum, default_value = "joint")]
     marginals: Marginals,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Kind {
+enum CarKind {
     #[value(name = "3d")]
     Car3d,
     #[value(name = "2d")]
@@ -85,19 +85,19 @@ enum Marginals {
 }
 
 impl Fit {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = fit_plan(&self.model, &self.options)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_field(&plan.run(context)?, tell.found(found));
+        print_field(&plan.run(context)?, console.found(found));
         let Some(name) = &self.report else { return Ok(()) };
         let comparison = fit::compare(&self.model, context)?;
         let text = figures_text(&comparison.figures());
         let file = |ending: &str| name.with_file_name(with_ending(name, &[], ending));
         let title = self.model.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        tell.text(&text);
+        console.text(&text);
         let text = prepare_bytes(&file(".txt"), context.existing, format!("{text}\n").as_bytes())?;
         let sheet = sheet::draw(&comparison, &title).prepare(&file(".png"), context.existing)?;
         publish_all([text, sheet])?;
@@ -109,8 +109,8 @@ pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> 
     fit::plan(&fit::Options {
         model: model.into(),
         kind: match options.mrf {
-            Kind::Car3d => field::Kind::Car3d,
-            Kind::Car2d => field::Kind::Car2d,
+            CarKind::Car3d => field::CarKind::Car3d,
+            CarKind::Car2d => field::CarKind::Car2d,
         },
         levels: options.levels,
         coordinates: match options.field {
@@ -129,7 +129,7 @@ pub(super) fn fit_plan(model: &Path, options: &FitOptions) -> Result<fit::Plan> 
     })
 }
 
-pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
+pub(super) fn print_field(report: &FieldReport, console: Console) {
     let levels: Vec<String> = report
         .levels
         .iter()
@@ -139,16 +139,16 @@ pub(super) fn tell_field(report: &FieldReport, tell: Tell) {
         })
         .collect();
     let error = format!("error of its autocovariance {:.3}", report.autocovariance_error);
-    if tell.brief {
+    if console.brief {
         let levels = counted(report.levels.len(), "level");
-        tell.stage("field", &format!("{}, {levels}; {error}", report.mrf));
+        console.stage("field", &format!("{}, {levels}; {error}", report.mrf));
     } else {
-        tell.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
-        tell.line(format!("          {error}"));
+        console.stage("field", &format!("{}; {}", report.mrf, levels.join(", ")));
+        console.line(format!("          {error}"));
     }
     for (number, level) in report.levels.iter().enumerate() {
         if let Some(note) = &level.note {
-            tell.line(format!("          level {number}: {note}"));
+            console.line(format!("          level {number}: {note}"));
         }
     }
 }

@@ -14,15 +14,16 @@ use clap_mangen::Man;
 use clap_mangen::roff::{Roff, roman};
 
 use super::terminal::{of_output, pieces};
-use super::{Cli, Tell};
+use super::{Cli, Console};
 
 /// Commands by what they are for, in the order of the work.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Convert", &["import", "export", "sample"]),
+const GROUPS: [(&str, &[&str]); 7] = [
+    ("Try", &["demo", "sample"]),
+    ("Convert", &["import", "export"]),
     ("Check", &["info", "check", "verify"]),
     ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
     ("Enlarge", &["enlarge", "judge"]),
-    ("Look", &["image", "demo"]),
+    ("Look", &["image"]),
     ("Set up", &["completions", "man", "help"]),
 ];
 
@@ -118,15 +119,15 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, console: Console) -> Result<()> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "btf", &mut text);
-        tell.as_it_is(String::from_utf8_lossy(&text).trim_end());
+        console.as_it_is(String::from_utf8_lossy(&text).trim_end());
         Ok(())
     }
 }
 
-/// Print a manual page, or write all of them into a folder
+/// Print a manual page, or write all pages into a folder
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -143,11 +144,11 @@ pub(super) struct Manual {
 }
 
 impl Manual {
-    pub(super) fn run(&self, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, console: Console) -> Result<()> {
         let mut whole = command();
         whole.build();
         if let Some(folder) = &self.out {
-            return write_pages(&whole, folder, tell);
+            return write_pages(&whole, folder, console);
         }
         let page = match &self.page {
             None => &whole,
@@ -155,12 +156,12 @@ impl Manual {
                 Error::usage(format!("no command is called {name:?}")).hint("btf --help lists them")
             })?,
         };
-        tell.as_it_is(String::from_utf8_lossy(&rendered(page)?).trim_end());
+        console.as_it_is(String::from_utf8_lossy(&rendered(page)?).trim_end());
         Ok(())
     }
 }
 
-fn write_pages(whole: &Command, folder: &Path, tell: Tell) -> Result<()> {
+fn write_pages(whole: &Command, folder: &Path, console: Console) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|error| Error::io("make", folder, error))?;
     let commands: Vec<&Command> = std::iter::once(whole)
         .chain(whole.get_subcommands().filter(|command| command.get_name() != "help"))
@@ -168,7 +169,7 @@ fn write_pages(whole: &Command, folder: &Path, tell: Tell) -> Result<()> {
     for command in &commands {
         write_file(&folder.join(format!("{}.1", page_name(command))), &rendered(command)?)?;
     }
-    tell.line(format!("{}: {}", folder.display(), counted(commands.len(), "page")));
+    console.line(format!("{}: {}", folder.display(), counted(commands.len(), "page")));
     Ok(())
 }
 

@@ -6,10 +6,11 @@ use btfkit::run::Context;
 use btfkit::stage::image;
 use clap::{Args, ValueEnum};
 
+use super::given::{Given, kind_at};
 use super::scene::SceneArgs;
-use super::{Tell, found};
+use super::{Console, found};
 
-/// Write a picture of a measurement, a model's tile or an enlargement
+/// Write a picture of a measurement, a model's tile or an enlargement, under any light and from any view
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -19,7 +20,7 @@ Examples:
   btf image wood.model.zarr --what normals --out normals.png
   btf image wood.zarr --out wood.jpg --quality 95
   btf image --plane wood.model.zarr --window -500,12345,512,512 --out piece.png
-                                                                      a part of a model's endless plane
+                                                                      a part of the endless surface of a model
 A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
 from the three views and three lights around them.")]
 pub(super) struct Image {
@@ -29,10 +30,10 @@ pub(super) struct Image {
     /// at most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory
     #[arg(long, short)]
     out: PathBuf,
-    /// Bits of a display value: 16 for PNG and TIFF
+    /// Bits of each value; 16 for PNG and TIFF only
     #[arg(long, value_enum, default_value = "8")]
     bits: BitsName,
-    /// Quality of a JPEG [default: 90]
+    /// Quality of a JPEG, 1 to 100 [default: 90]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
     /// What to show
@@ -61,12 +62,27 @@ enum What {
 }
 
 impl Image {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
         let subject = match self.what {
             What::Appearance => image::Subject::Appearance { view: self.scene.view, light: self.scene.light },
             What::Index => image::Subject::Index,
             What::Normals => image::Subject::Normals,
         };
+        self.scene.refuse_idle(given, &self.source, matches!(self.what, What::Appearance))?;
+        let ending = Ending::of(&self.out, &Ending::ALL).map_err(|error| match kind_at(&self.out) {
+            Some(_) => error.hint(format!(
+                "--out names the picture, not the store: btf image {} --out {}",
+                self.out.display(),
+                self.source.display()
+            )),
+            None => error,
+        })?;
+        if ending != Ending::Jpeg {
+            given.refuse_these(&["quality"], "in this format: it is that of a JPEG")?;
+        }
+        if ending == Ending::Exr {
+            given.refuse_these(&["bits"], "in an EXR, which holds linear floats")?;
+        }
         let options = self.scene.options(&self.source, subject);
         let bits = match self.bits {
             BitsName::Eight => Bits::Eight,
@@ -74,8 +90,8 @@ impl Image {
         };
         let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(Some(bits), self.quality)?;
         let report = image::run(&options, self.scene.exposure, &self.out, encoding, context)?;
-        tell.line(format!("{}: {}{}", self.out.display(), report.size, found(report.made)));
-        tell.notes(&report.notes);
+        console.line(format!("{}: {}{}", self.out.display(), report.size, found(report.made)));
+        console.notes(&report.notes);
         Ok(())
     }
 }

@@ -8,14 +8,16 @@ use btfkit::store::measurement::Description;
 use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
 use btfkit::zarr::codec::Chain;
+use btfkit_formats::SampleType;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::given::kind_at;
 use super::outputs::wanted_twice;
 use super::source::SourceArgs;
-use super::{Tell, bytes_text, number};
+use super::{Console, bytes_text, number};
 
-/// Convert archives into measurements, from any format that `btf info` lists; one archive or hundreds
+/// Convert archives of any common format into stores; one archive or hundreds
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -24,29 +26,30 @@ Examples:
   btf import tv*.zip wood.zarr                    one measurement in many pieces; the store comes last
   btf import *.zip *.btf --into stores            many archives, one store each; a bad one does not stop the others
   btf import felt.btf --shard 3/8                 the fourth of eight parts, for an array of jobs
-  btf import wall.btf --codec predictive          a tenth to a fifth smaller; zarr-python needs our module to read it
+  btf import wall.btf --codec predictive          a tenth to a fifth smaller
 If it is interrupted, run the same command again: it goes on with the views that are missing.")]
 pub(super) struct Import {
-    /// Archives, and last the measurement to make, if that name ends in .zarr and --into is not given
+    /// The archive, then the store to make [default: the archive's name with .zarr]; or many archives. A last name that
+    /// ends in .zarr is the store, and all names before it are pieces of one measurement
     #[arg(required = true, value_name = "ARCHIVE")]
     paths: Vec<PathBuf>,
-    /// Make one measurement for each archive, in this folder [default: the current folder]
+    /// Make one store for each archive, in this folder [default: the current folder]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Reflectance that counts as white, L* = 100
+    /// Reflectance that counts as white, L* = 100; less for very dark materials
     #[arg(long, default_value_t = 1.0, value_parser = number::white)]
     white: f64,
-    /// How to pack samples: `stock` opens in zarr-python as it is, `predictive` is smaller and faster
+    /// How to pack samples: `predictive` is smaller and faster, but zarr-python needs a module to read it
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
     codec: Chain,
-    /// Import part K of N of the views (K from 0)
+    /// Import only part K of N of the views, K from 0, so that N jobs share the work, in any order
     #[arg(long, value_name = "K/N", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// One archive and its store.
@@ -56,12 +59,12 @@ struct Job {
 }
 
 impl Import {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
         let jobs = self.jobs()?;
-        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, tell) };
-        if let Some((description, report, remarks)) = self.import(job, context, tell)? {
-            tell.line(format!("{}: {}", job.store.display(), told(&description, &report)));
-            remarks.iter().for_each(|remark| tell.line(format!("  {remark}")));
+        let [job] = jobs.as_slice() else { return self.import_all(&jobs, context, console) };
+        if let Some((description, report, remarks)) = self.import(job, context, console)? {
+            console.line(format!("{}: {}", job.store.display(), summary(&description, &report)));
+            remarks.iter().for_each(|remark| console.line(format!("  {remark}")));
         }
         Ok(Ended::Done)
     }
@@ -85,15 +88,12 @@ impl Import {
         if let Some(absent) = self.paths.iter().find(|path| !(path.exists() || is_new(path))) {
             expect_readable(absent)?;
             let error = Error::missing(format!("{}: no such archive", absent.display()));
+            if is_store(absent) {
+                return Err(error.hint("archives come first, and the store to make is named last"));
+            }
             return Err(
                 if self.into.is_none() && self.paths.len() > 1 && Some(absent) == self.paths.last() {
                     error.hint("the store to make is named last, and ends in .zarr")
-                } else if let Some((store, archive)) = self.swapped() {
-                    error.hint(format!(
-                        "the archive comes first and the store last: btf import {} {}",
-                        archive.display(),
-                        store.display()
-                    ))
                 } else {
                     error
                 },
@@ -133,9 +133,22 @@ impl Import {
         &self,
         job: &Job,
         context: &Context<'_>,
-        tell: Tell,
+        console: Console,
     ) -> Result<Option<(Description, Report, Vec<String>)>> {
-        let source = self.source.open(&job.pieces)?;
+        if let Some((store, kind)) = job.pieces.iter().find_map(|piece| Some((piece, kind_at(piece)?))) {
+            let what = format!("{} is a store already (a {kind}), expected an archive", store.display());
+            return Err(
+                Error::usage(what).hint("copy it as a folder, or name the archive that it was made of")
+            );
+        }
+        let source = self.source.open(&job.pieces).map_err(|error| match job.pieces.as_slice() {
+            // Of several names the last may have been meant for the stores.
+            [folder] if self.paths.len() > 1 && self.paths.last() == Some(folder) && folder.is_dir() => {
+                let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
+                error.hint(format!("{todo}if stores are to be put there: --into {}", folder.display()))
+            }
+            _ => error,
+        })?;
         let options = import::Options {
             store: job.store.clone(),
             white: self.white,
@@ -144,17 +157,29 @@ impl Import {
         };
         let plan = import::plan(source.as_ref(), options, context)?;
         if self.dry_run {
-            tell.plan(&plan.summary())?;
+            console.plan(&plan.summary())?;
             return Ok(None);
         }
         let report = plan.run(context)?;
+        let samples = plan.description().sample_type;
+        let is_cut = report.samples.clipped > 0
+            && matches!(samples, SampleType::U8 | SampleType::U16)
+            && (self.white - 1.0).abs() < f64::EPSILON;
+        let lost = is_cut.then(|| {
+            format!(
+                "{} above white became white, as {} samples hold no more: --samples f16 keeps them",
+                counted(report.samples.clipped, "sample"),
+                samples.name()
+            )
+        });
         let assumed = source.contents().assumptions.iter().map(|text| format!("assumed: {text}"));
-        let remarks = btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).collect();
+        let remarks =
+            btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).chain(lost).collect();
         Ok(Some((plan.description().clone(), report, remarks)))
     }
 
     /// Imports many archives under one bar; those that fail do not stop the others.
-    fn import_all(&self, jobs: &[Job], context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    fn import_all(&self, jobs: &[Job], context: &Context<'_>, console: Console) -> Result<Ended> {
         // Counted before anything is imported: opening an archive is cheap.
         let images = |job: &Job| {
             let contents = self.source.open(&job.pieces).map(|source| {
@@ -170,11 +195,11 @@ impl Import {
             .with_memory(context.memory())
             .with_existing(context.existing);
         let name = |job: &Job| job.pieces.first().map_or_else(String::new, |path| path.display().to_string());
-        each(jobs, name, false, context, tell, |job| {
+        each(jobs, name, false, context, console, |job| {
             context.progress.remark(&name(job));
-            let report = self.import(job, &inner, tell)?;
+            let report = self.import(job, &inner, console)?;
             let told = report.map(|(description, report, remarks)| {
-                std::iter::once(told(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
+                std::iter::once(summary(&description, &report)).chain(remarks).collect::<Vec<_>>().join("; ")
             });
             let store = job.store.display();
             Ok((Line::Text(told.map_or(format!("{store}"), |told| format!("{store}: {told}"))), None))
@@ -187,7 +212,7 @@ fn is_store(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists()
 }
 
-fn told(description: &Description, report: &Report) -> String {
+fn summary(description: &Description, report: &Report) -> String {
     let mut text = format!(
         "{} x {} of {}, {} raw; {} written, {} found done, {} clipped at white",
         counted(description.views.len(), "view"),

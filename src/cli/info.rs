@@ -15,11 +15,12 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::each::{Ended, Line, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json, bytes_text};
+use super::{Console, as_json, bytes_text};
 
-/// Show what an archive or a store holds, and how large the store of an archive will be
+/// Show what an archive or a store holds, and how large an archive will be once imported
 #[derive(Args)]
 #[command(after_help = "\
 Archives are recognised by their content:
@@ -33,17 +34,17 @@ Examples:
   btf info wood.model.zarr --json
   btf info archives/*                               one line each, and a count")]
 pub(super) struct Info {
-    /// Archives and stores; with several, each gets one line
+    /// Archives and stores; if there are several, each gets one line
     #[arg(required = true, value_name = "PATH")]
     paths: Vec<PathBuf>,
-    /// Take the archives for pieces of one measurement
+    /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print it as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 /// What an archive holds, and how large its store will be.
@@ -71,32 +72,33 @@ enum Told {
 type Rows = Vec<Vec<String>>;
 
 impl Info {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         if self.paths.len() > 1 && !self.pieces {
             let name = |path: &PathBuf| path.display().to_string();
-            return each(&self.paths, name, self.json, context, tell, |path| {
-                let told = self.look(std::slice::from_ref(path), context)?;
+            return each(&self.paths, name, self.json, context, console, |path| {
+                let told = self.look(std::slice::from_ref(path), given, context)?;
                 let line =
                     if self.json { Line::Json(as_json(&told)?) } else { Line::Text(in_short(&rows(&told))) };
                 Ok((line, None))
             });
         }
-        let told = self.look(&self.paths, context)?;
+        let told = self.look(&self.paths, given, context)?;
         if self.json {
-            tell.plan(&as_json(&told)?)?;
+            console.plan(&as_json(&told)?)?;
         } else {
-            tell.text(&table(&rows(&told)));
+            console.text(&table(&rows(&told)));
         }
         Ok(Ended::Done)
     }
 
     /// Looks at one store, or at one archive in pieces perhaps.
-    fn look(&self, paths: &[PathBuf], context: &Context<'_>) -> Result<Told> {
+    fn look(&self, paths: &[PathBuf], given: &Given, context: &Context<'_>) -> Result<Told> {
         let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
         let is_zarr = ["zarr.json"].iter().chain(&VERSION_2).any(|name| first.join(name).exists());
         // A store that has lost its metadata is no archive.
         let is_named_so = ends_with(first, ".zarr");
         if is_zarr || is_named_so || is_pyramid(first) {
+            given.refuse_for_stores(paths)?;
             return about::store(first).map(Told::Store);
         }
         let source = self.source.open(paths)?;

@@ -11,18 +11,18 @@ use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 use super::table::{row, table};
 
-/// Rate an enlargement beside real crops of the material: 1 is as near as another real crop
+/// Rate how near an enlargement is to the real material: 1 is as near as another real piece of it
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf judge wood-4k.zarr --against wood.zarr
   btf judge wood-4k.zarr --against wood.zarr --sheet judged.png --json judged.json
-  btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of a model's endless plane
+  btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless surface of a model
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
-J is the worst of five measures; 1 is as good as another real crop. docs/how-to/judge.md says what each measure sees.")]
+J is the worst of five measures; 1 is as near as another real crop. docs/how-to/judge.md says what each measure sees.")]
 pub(super) struct Judge {
     /// An enlargement, or a model with --size
     subject: PathBuf,
@@ -33,26 +33,26 @@ pub(super) struct Judge {
     /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// How much of a model's endless plane to judge, WIDTHxHEIGHT, each from 1 to 16777216
+    /// How much of the endless surface of a model to judge, WIDTHxHEIGHT, each from 1 to 16777216
     #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Numbers of a view and a light, from 0; repeat the option for more [default: five pairs spread over the
-    /// directions]
+    /// Judge under this view and light, by their numbers from 0; repeat the option for more [default: five pairs
+    /// spread over the directions]
     #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]
     #[arg(long, value_name = "N")]
     crop: Option<usize>,
-    /// Write all figures to a JSON file
+    /// Also write all figures to a JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
+    /// Also write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE")]
     sheet: Option<PathBuf>,
 }
 
 impl Judge {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         if let Some(path) = &self.sheet {
             Ending::of(path, &Ending::DISPLAY)?;
         }
@@ -67,7 +67,7 @@ impl Judge {
             },
             context,
         )?;
-        tell.text(&told(&report));
+        console.text(&text_of(&report));
         let mut files = Vec::new();
         if let Some(path) = &self.json {
             let text =
@@ -82,7 +82,7 @@ impl Judge {
     }
 }
 
-fn told(report: &Report) -> String {
+fn text_of(report: &Report) -> String {
     let [height, width] = report.size;
     let origin = match report.origin {
         Origin::HeldOut => "parts of the measurement that the tile did not use",

@@ -12,6 +12,7 @@ mod each;
 mod enlarge;
 mod export;
 mod fit;
+mod given;
 mod help;
 mod image;
 mod import;
@@ -30,7 +31,7 @@ mod terminal;
 mod tile;
 mod verify;
 
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,27 +39,29 @@ use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use btfkit::disk::output::Made;
-use btfkit::error::{Error, Kind, Result};
-use btfkit::run::budget::{Allowance, cannot_start, spare_address_space};
+use btfkit::error::{Error, ErrorKind, Result};
+use btfkit::run::budget::{Allowance, cannot_start, expect_stack, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::run::{Context, Existing};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
 use bytes::bytes_text;
 use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 use each::Ended;
+use given::Given;
 use serde_json::Value;
 
 const EXAMPLES: &str = "\
 Examples:
-  btf demo                                      the whole method on a synthetic material, with pictures
-  btf import UBO_WOOD256.zip wood.zarr          an archive becomes a measurement
-  btf model wood.zarr wood.model.zarr           a measurement becomes a model
+  btf demo                                      run the whole method on a synthetic material, with pictures
+  btf import UBO_WOOD256.zip wood.zarr          make a store of an archive
+  btf model wood.zarr wood.model.zarr           make a model of the store
   btf enlarge wood.model.zarr big.zarr --size 4096x4096
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
 Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done, 1 failed, 2 usage, 65 bad input or a result of other options, 66 input not there yet,
-74 input/output, 75 stopped early (run the same command again).";
+Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else is at the place of the result;
+66 input not there yet; 74 the system refuses to read or write; 75 stopped on request (run the same command again).
+The book is in docs/; docs/README.md says where to begin.";
 
 /// Why something could not be written to standard output: the program must not end as if it had been told.
 static UNTOLD: OnceLock<std::io::Error> = OnceLock::new();
@@ -68,7 +71,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("BTF_COMMIT"
 /// More threads than any machine has cores that share a memory.
 const MOST_THREADS: i64 = 1024;
 
-/// Turns a measured BTF (bidirectional texture function) into a small model, and a model into textures of any size.
+/// Turns a measured BTF (bidirectional texture function) into a small model, and the model into surfaces of any size.
 #[derive(Parser)]
 #[command(name = "btf", version = VERSION, after_help = EXAMPLES, subcommand_help_heading = "Commands")]
 struct Cli {
@@ -92,8 +95,7 @@ struct Common {
     /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace results that exist, and redo what was made with other options. Without it, nothing that exists is ever
-    /// replaced
+    /// Replace results that exist, also those of other options. Without it, nothing that exists is ever replaced
     #[arg(long, global = true)]
     force: bool,
     /// Print nothing but errors
@@ -103,7 +105,7 @@ struct Common {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ProgressStyle {
-    /// Bars on a terminal, nothing elsewhere.
+    /// Bars on a terminal; elsewhere a line every half minute.
     Auto,
     /// One JSON object a line on standard error, for schedulers; errors too.
     Json,
@@ -135,31 +137,15 @@ enum Command {
     Man(help::Manual),
 }
 
-/// Names of the arguments that a command was given.
-fn given(matches: &clap::ArgMatches) -> Vec<String> {
-    let Some((name, found)) = matches.subcommand() else { return Vec::new() };
-    let command = help::command();
-    // Groups are among the names that were found, too.
-    let arguments = command.find_subcommand(name).into_iter().flat_map(clap::Command::get_arguments);
-    let names = arguments.map(|argument| argument.get_id().as_str());
-    let is_given = |name: &&str| {
-        matches!(found.try_contains_id(name), Ok(true))
-            && found.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
-    };
-    names.filter(is_given).map(str::to_owned).collect()
-}
-
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
+    if let Err(error) = expect_stack() {
+        Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
+        return ExitCode::from(exit_code(error.kind()));
+    }
     let matches = help::command().try_get_matches();
-    let cli = matches.and_then(|matches| {
-        let mut cli = Cli::from_arg_matches(&matches)?;
-        if let Command::Export(export) = &mut cli.command {
-            export.note_given(given(&matches));
-        }
-        Ok(cli)
-    });
-    let cli = cli.unwrap_or_else(|error| help::explained(error).exit());
+    let cli = matches.and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, Given::of(&matches))));
+    let (cli, given) = cli.unwrap_or_else(|error| help::explained(error).exit());
     let threads = cli.common.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,
@@ -176,9 +162,10 @@ pub(crate) fn run() -> ExitCode {
         _ if cli.common.quiet => Box::new(Silent),
         ProgressStyle::None => Box::new(Silent),
         ProgressStyle::Json => Box::new(progress::Lines::default()),
-        ProgressStyle::Auto => Box::new(progress::Bars::default()),
+        ProgressStyle::Auto if std::io::stderr().is_terminal() => Box::new(progress::Bars::default()),
+        ProgressStyle::Auto => Box::new(progress::Plain::default()),
     };
-    let tell = Tell {
+    let console = Console {
         quiet: cli.common.quiet,
         found: false,
         brief: false,
@@ -197,10 +184,13 @@ pub(crate) fn run() -> ExitCode {
             let context = context.with_memory(memory);
             context.with_existing(if cli.common.force { Existing::Replace } else { Existing::Keep })
         })
-        .inspect(|context| obey_while_computing(&stop, context.computing(), tell))
+        .inspect(|context| obey_while_computing(&stop, context.computing(), console, cli.command.goes_on()))
         .and_then(|context| {
-            context.require("the program itself", 0)?;
-            cli.command.run(&context, tell)
+            // The others say themselves what they need, all of it at once.
+            if !cli.command.says_what_it_needs() {
+                context.require("the program itself", 0)?;
+            }
+            cli.command.run(&given, &context, console)
         });
     progress.end();
     let result = result.and_then(|ended| match UNTOLD.get() {
@@ -213,9 +203,19 @@ pub(crate) fn run() -> ExitCode {
         Ok(Ended::Done) => ExitCode::SUCCESS,
         Ok(Ended::Failed(kind)) => ExitCode::from(exit_code(kind)),
         Err(error) => {
-            tell.failure(None, &error);
+            let error =
+                if error.kind() == ErrorKind::Stopped { stopped(cli.command.goes_on()) } else { error };
+            console.failure(None, &error);
             ExitCode::from(exit_code(error.kind()))
         }
+    }
+}
+
+/// What a stop means: a command that keeps nothing of what it did does not go on.
+fn stopped(goes_on: bool) -> Error {
+    match goes_on {
+        true => Error::stopped(),
+        false => Error::stopped().hint("nothing was left behind: the same command begins from the start"),
     }
 }
 
@@ -242,15 +242,15 @@ fn explain_aborts(json: bool) {
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Ends the program at the first signal while it computes what cannot look for one: there is nothing to lose but time.
-fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell: Tell) {
+fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, console: Console, goes_on: bool) {
     let stop = Arc::clone(stop);
     // Without a thread for it the second signal ends the program.
     let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
         loop {
             std::thread::sleep(LOOK);
             if stop.load(Ordering::SeqCst) && computing.load(Ordering::SeqCst) {
-                let error = Error::stopped();
-                tell.failure(None, &error);
+                let error = stopped(goes_on);
+                console.failure(None, &error);
                 std::process::exit(i32::from(exit_code(error.kind())));
             }
         }
@@ -258,47 +258,69 @@ fn obey_while_computing(stop: &Arc<AtomicBool>, computing: Arc<AtomicBool>, tell
 }
 
 impl Command {
-    fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    /// Whether the command checks the memory for its work, the program's own included.
+    fn says_what_it_needs(&self) -> bool {
+        !matches!(
+            self,
+            Self::Demo(_)
+                | Self::Info(_)
+                | Self::Judge(_)
+                | Self::Appearance(_)
+                | Self::Completions(_)
+                | Self::Man(_)
+        )
+    }
+
+    /// Whether the same command goes on where it was stopped.
+    fn goes_on(&self) -> bool {
+        match self {
+            Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
+            Self::Export(command) => command.goes_on(),
+            _ => false,
+        }
+    }
+
+    fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         let single = match self {
-            Self::Info(command) => return command.run(context, tell),
-            Self::Check(command) => return command.run(context, tell),
-            Self::Import(command) => return command.run(context, tell),
-            Self::Verify(command) => return command.run(context, tell),
-            Self::Model(command) => return command.run(context, tell),
-            Self::Enlarge(command) => return command.run(context, tell),
-            Self::Demo(command) => command.run(context, tell),
-            Self::Sample(command) => command.run(context, tell),
-            Self::Export(command) => command.run(context, tell),
-            Self::Tile(command) => command.run(context, tell),
-            Self::Cluster(command) => command.run(context, tell),
-            Self::Curve(command) => command.run(context, tell),
-            Self::Normals(command) => command.run(context, tell),
-            Self::Fit(command) => command.run(context, tell),
-            Self::Appearance(command) => command.run(context, tell),
-            Self::Compare(command) => command.run(context, tell),
-            Self::Image(command) => command.run(context, tell),
-            Self::Judge(command) => command.run(context, tell),
-            Self::Completions(command) => command.run(tell),
-            Self::Man(command) => command.run(tell),
+            Self::Info(command) => return command.run(given, context, console),
+            Self::Check(command) => return command.run(given, context, console),
+            Self::Import(command) => return command.run(context, console),
+            Self::Verify(command) => return command.run(given, context, console),
+            Self::Model(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(context, console),
+            Self::Demo(command) => command.run(context, console),
+            Self::Sample(command) => command.run(context, console),
+            Self::Export(command) => command.run(given, context, console),
+            Self::Tile(command) => command.run(context, console),
+            Self::Cluster(command) => command.run(given, context, console),
+            Self::Curve(command) => command.run(context, console),
+            Self::Normals(command) => command.run(context, console),
+            Self::Fit(command) => command.run(context, console),
+            Self::Appearance(command) => command.run(context, console),
+            Self::Compare(command) => command.run(context, console),
+            Self::Image(command) => command.run(given, context, console),
+            Self::Judge(command) => command.run(context, console),
+            Self::Completions(command) => command.run(console),
+            Self::Man(command) => command.run(console),
         };
         single.map(|()| Ended::Done)
     }
 }
 
-fn exit_code(kind: Kind) -> u8 {
+fn exit_code(kind: ErrorKind) -> u8 {
     match kind {
-        Kind::Internal => 1,
-        Kind::Usage => 2,
-        Kind::Input | Kind::Recipe => 65,
-        Kind::Missing => 66,
-        Kind::Io => 74,
-        Kind::Stopped => 75,
+        ErrorKind::Internal => 1,
+        ErrorKind::Usage => 2,
+        ErrorKind::Input | ErrorKind::Recipe => 65,
+        ErrorKind::Missing => 66,
+        ErrorKind::Io => 74,
+        ErrorKind::Stopped => 75,
     }
 }
 
 /// Where results are told.
 #[derive(Clone, Copy)]
-struct Tell {
+struct Console {
     quiet: bool,
     /// What is told was found done.
     found: bool,
@@ -308,7 +330,7 @@ struct Tell {
     json: bool,
 }
 
-impl Tell {
+impl Console {
     /// Tells nothing but failures.
     fn silent(self) -> Self {
         Self { quiet: true, ..self }
@@ -431,7 +453,7 @@ mod tests {
 
     use clap::CommandFactory;
 
-    use super::option_effects::{COMMON, Effect, RECIPES, WITHOUT};
+    use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
     use super::*;
 
     /// An option that is not in the table of effects may be forgotten in a recipe: so it does not pass.
@@ -454,8 +476,10 @@ mod tests {
             if WITHOUT.contains(&name) {
                 continue;
             }
-            let told = RECIPES.iter().find(|of| of.command == name).map(|of| of.options);
-            let told: BTreeSet<&str> = told.unwrap_or_default().iter().map(|(option, _)| *option).collect();
+            let recipes = RECIPES.iter().filter(|of| of.command == name).flat_map(|of| of.options);
+            let outputs = OUTPUTS.iter().filter(|of| of.command == name).flat_map(|of| of.options);
+            let told: BTreeSet<&str> =
+                recipes.map(|(option, _)| *option).chain(outputs.map(|(option, _)| *option)).collect();
             let found: BTreeSet<&str> =
                 command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
             assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");
@@ -464,6 +488,15 @@ mod tests {
             Effect::Apart(reason) => Some(*reason),
             Effect::Changes(arguments) | Effect::Keeps(arguments) => arguments.first().copied(),
         });
-        assert!(reasons.chain(COMMON.iter().map(|(_, reason)| *reason)).all(|reason| !reason.is_empty()));
+        let unseen = OUTPUTS.iter().flat_map(|of| of.options).filter_map(|(_, shown)| match shown {
+            Shown::Unseen(reason) => Some(*reason),
+            Shown::Shows(arguments, _) => arguments.first().copied(),
+        });
+        assert!(
+            reasons
+                .chain(unseen)
+                .chain(COMMON.iter().map(|(_, reason)| *reason))
+                .all(|reason| !reason.is_empty())
+        );
     }
 }

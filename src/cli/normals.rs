@@ -6,11 +6,11 @@ use btfkit::stage::normals;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 
 #[derive(Args)]
 pub(super) struct NormalsOptions {
-    /// Leave out shadowed and highlighted lights
+    /// Leave out lights that are shadows or highlights at a texel
     #[arg(long)]
     robust: bool,
 }
@@ -20,7 +20,7 @@ pub(super) struct NormalsOptions {
 #[command(after_help = "\
 Examples:
   btf normals wood.zarr wood.model.zarr
-  btf normals wood.zarr wood.model.zarr --robust    leaves out shadowed and highlighted lights")]
+  btf normals wood.zarr wood.model.zarr --robust    for materials with shadows or highlights")]
 pub(super) struct Normals {
     /// The measurement
     measurement: PathBuf,
@@ -34,13 +34,13 @@ pub(super) struct Normals {
 }
 
 impl Normals {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = normals_plan(&self.measurement, &self.model, &self.options)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_normals(&plan.run(context)?, tell.found(found));
+        print_normals(&plan.run(context)?, console.found(found));
         Ok(())
     }
 }
@@ -57,10 +57,10 @@ pub(super) fn normals_plan(
     })
 }
 
-pub(super) fn tell_normals(report: &normals::Report, tell: Tell) {
+pub(super) fn print_normals(report: &normals::Report, console: Console) {
     let [x, y, z] = report.mean;
     let lights = counted(report.lights, "light");
-    tell.stage(
+    console.stage(
         "normals",
         &format!(
             "by {lights} of view {}; mean ({x:.3}, {y:.3}, {z:.3}), spread {:.1} degrees",

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::given::kind_at;
 use btfkit::error::{Error, Result};
 use btfkit::names::{ends_with, with_ending};
 use btfkit::zarr::Store;
@@ -34,6 +35,14 @@ impl Naming<'_> {
         {
             return Ok(vec![Pair { input: input.clone(), output: output.clone() }]);
         }
+        if let ([first, second], None) = (names, into)
+            && kind_at(second) == Some(self.reads)
+            && self.is_output_named_first(first)
+        {
+            let (first, second, reads) = (first.display(), second.display(), self.reads);
+            return Err(Error::usage(format!("{first}: no {reads}, but {second} is one"))
+                .hint(format!("what is read is named first, what is made last: {second} {first}")));
+        }
         // Nothing is begun where a name is wrong, or stands in another's place.
         if let ([_, .., last], None) = (names, into)
             && last.symlink_metadata().is_err()
@@ -50,6 +59,14 @@ impl Naming<'_> {
             Some(output) => Err(Error::usage(format!("two inputs would both become {}", output.display()))
                 .hint("give them one by one and name the outputs")),
         }
+    }
+
+    /// Whether the first of two names, of which the second is an input, is a result: nothing is there yet, or another
+    /// kind of store.
+    fn is_output_named_first(&self, name: &Path) -> bool {
+        let by_ending = self.ending.is_some_and(|ending| ends_with(name, ending));
+        !by_ending
+            && (name.symlink_metadata().is_err() || kind_at(name).is_some_and(|kind| kind != self.reads))
     }
 
     fn is_input(&self, name: &Path) -> bool {

@@ -11,7 +11,10 @@ use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 /// Least time between two JSON lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// A bar on the terminal for the step under way; nothing where standard error is no terminal.
+/// Least time between two lines for people, and before the first one.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(30);
+
+/// A bar on the terminal for the step under way.
 #[derive(Default)]
 pub(super) struct Bars {
     bar: Mutex<Option<ProgressBar>>,
@@ -98,6 +101,63 @@ impl Progress for Bars {
     }
 }
 
+/// Lines for people where standard error is no terminal, in a log say: how far the step under way is, every half minute.
+/// What ends sooner tells nothing.
+#[derive(Default)]
+pub(super) struct Plain {
+    step: Mutex<Option<Step>>,
+    stage: Mutex<Option<Stage>>,
+    told: Mutex<Option<Instant>>,
+}
+
+impl Plain {
+    /// Tells the step under way, unless a line was told just now.
+    fn tell(&self) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if told.get_or_insert_with(Instant::now).elapsed() < PLAIN_INTERVAL {
+            return;
+        }
+        *told = Some(Instant::now());
+        if let Some(step) = &*self.step.lock().unwrap_or_else(PoisonError::into_inner) {
+            let _ = writeln!(std::io::stderr(), "btf: {}", escaped(&step.in_words()));
+        }
+    }
+}
+
+impl Progress for Plain {
+    fn begin(&self, title: &str, total: u64, counted: Counted) {
+        let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        *self.step.lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(Step::new(title, total, counted, stage));
+        self.tell();
+    }
+
+    fn advance(&self, count: u64) {
+        if let Some(step) = &mut *self.step.lock().unwrap_or_else(PoisonError::into_inner) {
+            step.done += count;
+        }
+        self.tell();
+    }
+
+    fn remark(&self, text: &str) {
+        if let Some(step) = &mut *self.step.lock().unwrap_or_else(PoisonError::into_inner) {
+            step.remark = Some(text.to_owned());
+        }
+    }
+
+    fn end(&self) {
+        *self.step.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    fn stage(&self, stage: Option<Stage>) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
+    }
+
+    fn notice(&self, text: &str) {
+        let _ = writeln!(std::io::stderr(), "btf: {}", escaped(text));
+    }
+}
+
 /// A JSON object a line on standard error: when a step begins, about once a second, and when it ends.
 #[derive(Default)]
 pub(super) struct Lines {
@@ -117,10 +177,37 @@ struct Step {
 }
 
 impl Step {
-    fn tell(&self, event: &str) {
+    fn new(title: &str, total: u64, counted: Counted, stage: Option<Stage>) -> Self {
+        let unit = match counted {
+            Counted::Items(name) => name,
+            Counted::Bytes => "bytes",
+        };
+        let now = Instant::now();
+        Self { title: title.to_owned(), unit, done: 0, total, began: now, told: now, remark: None, stage }
+    }
+
+    /// Seconds since it began, counts in a second, and seconds left where that can be told.
+    fn pace(&self) -> (f64, f64, Option<f64>) {
         let seconds = self.began.elapsed().as_secs_f64();
         let rate = self.done as f64 / seconds.max(1e-9);
         let left = (self.done > 0).then(|| self.total.saturating_sub(self.done) as f64 / rate);
+        (seconds, rate, left)
+    }
+
+    /// `stage 2 of 18: factorise, export: 40 of 81 views, 12 s left`.
+    fn in_words(&self) -> String {
+        let stage = match self.stage {
+            Some(stage) if stage.name == self.title => stage.to_string(),
+            Some(stage) => format!("{stage}, {}", self.title),
+            None => self.title.clone(),
+        };
+        let left = self.pace().2.map_or(String::new(), |left| format!(", {left:.0} s left"));
+        let remark = self.remark.as_ref().map_or(String::new(), |remark| format!(", {remark}"));
+        format!("{stage}: {} of {} {}{left}{remark}", self.done, self.total, self.unit)
+    }
+
+    fn tell(&self, event: &str) {
+        let (seconds, rate, left) = self.pace();
         let line = serde_json::json!({
             "event": event, "step": self.title, "done": self.done, "total": self.total, "unit": self.unit,
             "seconds": seconds, "per_second": rate, "seconds_left": left, "remark": self.remark,
@@ -140,14 +227,8 @@ fn as_json(stage: Stage) -> serde_json::Value {
 
 impl Progress for Lines {
     fn begin(&self, title: &str, total: u64, counted: Counted) {
-        let unit = match counted {
-            Counted::Items(name) => name,
-            Counted::Bytes => "bytes",
-        };
-        let now = Instant::now();
         let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
-        let title = title.to_owned();
-        let step = Step { title, unit, done: 0, total, began: now, told: now, remark: None, stage };
+        let step = Step::new(title, total, counted, stage);
         step.tell("begin");
         *self.step.lock().unwrap_or_else(PoisonError::into_inner) = Some(step);
     }
@@ -184,5 +265,20 @@ impl Progress for Lines {
 
     fn notice(&self, text: &str) {
         write_line(&serde_json::json!({"event": "notice", "text": text}));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_says_which_part_of_what_is_done() {
+        let stage = Stage { number: 2, of: 18, name: "factorise" };
+        let mut step = Step::new("export", 81, Counted::Items("views"), Some(stage));
+        assert_eq!(step.in_words(), "stage 2 of 18: factorise, export: 0 of 81 views");
+        step.done = 81;
+        step.remark = Some("b.zip".to_owned());
+        assert!(step.in_words().ends_with("81 of 81 views, 0 s left, b.zip"), "{}", step.in_words());
     }
 }

@@ -1,16 +1,16 @@
 use std::path::PathBuf;
 
-use btfkit::error::Result;
+use btfkit::error::{Error, Result};
 use btfkit::run::Context;
-use btfkit::sample::{Kind, MOST_SIDE};
+use btfkit::sample::{MOST_SIDE, MaterialKind};
 use btfkit::shape::Size;
 use btfkit::stage::sample;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::{Tell, bytes_text, found, number};
+use super::{Console, bytes_text, found, number};
 
-/// Make a synthetic measurement: a zip of pictures named like those of UBO2003
+/// Make a synthetic measurement to try things with: a zip of pictures, named as in UBO2003
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -20,22 +20,22 @@ Examples:
 pub(super) struct Sample {
     /// The zip to write
     archive: PathBuf,
-    /// Which material
+    /// The material
     #[arg(long, value_enum, default_value = "leather")]
     material: Material,
     /// Size of the images, WIDTHxHEIGHT, each from 1 to 65536
     #[arg(long, default_value = "128x128", allow_hyphen_values = true, value_parser = size)]
     size: Size,
-    /// Number of views; 81 gives the directions of UBO2003
+    /// Number of views; 81 are the directions of UBO2003
     #[arg(long, default_value_t = 81)]
     views: usize,
-    /// Number of lights
+    /// Number of lights; 81 are the directions of UBO2003
     #[arg(long, default_value_t = 81)]
     lights: usize,
-    /// Seed of the material
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Size of the features relative to the default
+    /// Size of cells or rings, as a multiple of the default
     #[arg(long, default_value_t = 1.0, value_parser = number::scale)]
     scale: f64,
 }
@@ -51,7 +51,7 @@ pub(super) enum Material {
     Leather,
 }
 
-impl From<Material> for Kind {
+impl From<Material> for MaterialKind {
     fn from(material: Material) -> Self {
         match material {
             Material::Wood => Self::Wood,
@@ -61,7 +61,13 @@ impl From<Material> for Kind {
 }
 
 impl Sample {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        if self.archive.extension().is_some_and(|ending| ending == "zarr") {
+            let archive = self.archive.with_extension("zip");
+            let (named, archive) = (self.archive.display(), archive.display());
+            return Err(Error::usage(format!("{named}: btf sample writes a zip, which is no store"))
+                .hint(format!("btf sample {archive}, then btf import {archive} {named}")));
+        }
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),
@@ -74,7 +80,7 @@ impl Sample {
             },
             context,
         )?;
-        tell.line(format!(
+        console.line(format!(
             "{}: {}, {}{}",
             self.archive.display(),
             counted(report.images, "image"),

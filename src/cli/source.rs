@@ -1,6 +1,6 @@
 //! What a reader of archives is told at the command line; the same for every command that reads one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
 use btfkit::archive::{self, Source};
@@ -15,43 +15,44 @@ use clap::{Args, ValueEnum};
 #[derive(Args, Clone)]
 #[command(next_help_heading = "Reading the archive")]
 pub(super) struct SourceArgs {
-    /// Transfer curve of the samples [default: the archive's; sRGB for 8-bit images, linear for floats]
+    /// Curve of the samples: sRGB codes or linear values [default: the archive's; if it has none, srgb for integers and
+    /// linear for floats]
     #[arg(long, value_enum)]
     pub(super) transfer: Option<Curve>,
-    /// Convert samples to this type [default: as they are]
+    /// Convert samples to this type [default: keep theirs]
     #[arg(long, value_enum)]
     samples: Option<SampleName>,
     /// Which azimuths of the archive run clockwise
     #[arg(long, value_enum)]
     azimuth: Option<Azimuth>,
-    /// Turn all directions counter-clockwise by so many degrees
+    /// Turn all directions counter-clockwise by this many degrees
     #[arg(long, value_parser = ["90", "180", "270"])]
     turn: Option<String>,
     /// Exchange rows and columns of the images
     #[arg(long)]
     transpose: bool,
-    /// Exchange light and view: the archive has them the wrong way round
+    /// Exchange light and view, if the archive has them the wrong way round
     #[arg(long)]
     swap: bool,
-    /// `excluded`: the cosine of the light angle is not in the values, so multiply it in
+    /// Say `excluded` if the cosine of the light angle was divided out; it is then multiplied in
     #[arg(long, value_parser = ["excluded"])]
     cosine: Option<String>,
-    /// Where the angles stand in file names, such as '{theta_v}_{phi_v}_{theta_i}_{phi_i}.exr'
+    /// Where the angles stand in file names, such as '{theta_v}_{phi_v}_{theta_i}_{phi_i}.exr' (v view, i light)
     #[arg(long, value_name = "TEXT")]
     pattern: Option<String>,
     /// A CSV table with the columns file, theta_i, phi_i, theta_v, phi_v (degrees)
     #[arg(long, value_name = "FILE", conflicts_with = "pattern")]
     table: Option<PathBuf>,
-    /// Directions of an array, or the order of a BIG or MIF file, that has none of its own
+    /// The published list of directions, for an array, BIG or MIF file that has none
     #[arg(long, value_parser = ["ubo81", "bonn151", "uniform"])]
     order: Option<String>,
-    /// `reversed`: rows of a Bonn container begin with the bottom one
+    /// Say `reversed` if the rows of a Bonn container begin at the bottom
     #[arg(long, value_parser = ["reversed"])]
     rows: Option<String>,
-    /// `atrium`: scan lines of Radiance pictures that name X first are rows, from the bottom up
+    /// Say `atrium` if the scan lines of Radiance pictures that name X first are rows, from the bottom up
     #[arg(long, value_parser = ["rules", "atrium"])]
     hdr: Option<String>,
-    /// Leave out a view, by its number in the archive; repeat the option for more
+    /// Leave out the view of this number, from 0; repeat the option for more
     #[arg(long, value_name = "N")]
     drop_view: Vec<usize>,
 }
@@ -120,6 +121,26 @@ impl SourceArgs {
     /// Opens the archive at one path, or in pieces at several.
     pub(super) fn open(&self, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
         paths.iter().try_for_each(|path| expect_readable(path))?;
-        archive::open(paths, &self.options())
+        archive::open(paths, &self.options()).map_err(|error| match paths {
+            [folder] if holds_archives(folder) => {
+                let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
+                let each = folder.join("*");
+                error.hint(format!(
+                    "{todo}if its archives are a measurement each, name them: {}",
+                    each.display()
+                ))
+            }
+            _ => error,
+        })
     }
+}
+
+/// Whether a folder holds several archives that are one file each.
+fn holds_archives(folder: &Path) -> bool {
+    const ENDINGS: [&str; 7] = ["zip", "btf", "h5", "hdf5", "npy", "big", "mif"];
+    let is_archive = |path: PathBuf| {
+        path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter(|entry| is_archive(entry.path())).take(2).count() > 1
 }

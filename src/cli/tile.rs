@@ -6,32 +6,38 @@ use btfkit::run::Context;
 use btfkit::stage::tile;
 use clap::Args;
 
-use super::Tell;
+use super::Console;
 
 /// Of a plane of which the tile is less than this, more is worth having.
 const LITTLE: f64 = 0.5;
 
 #[derive(Args)]
 pub(super) struct TileOptions {
-    /// What to take as the tile. auto: as largest, up to 256 texels a side, else as cut; largest: everything if the
-    /// borders join, else the largest seamless part; cut: the part whose seams show least; WIDTHxHEIGHT: a seamless
-    /// part of that size; plane: everything; none: everything, with borders that do not join; periodic: everything,
-    /// with borders that do
-    #[arg(long, default_value = "auto")]
+    /// The part of the measurement that becomes the tile
+    ///
+    /// - auto:         as largest if no side has more than 256 texels, otherwise as cut
+    /// - largest:      everything if its borders join, otherwise the largest seamless part
+    /// - cut:          the part whose seams show least, at most 256 texels a side
+    /// - WIDTHxHEIGHT: a seamless part of that size
+    /// - plane:        everything; whether its borders join is measured
+    /// - none:         everything, with borders that do not join
+    /// - periodic:     everything, with borders that join
+    #[arg(long, default_value = "auto", verbatim_doc_comment)]
     tile: tile::Choice,
-    /// The lattice of a regular material, in texels: auto (found in the picture), none, dy,dx (ribs), or dy,dx;dy,dx
+    /// Steps from cell to cell of a regular material, in texels: dy,dx;dy,dx (weaves), dy,dx (ribs), none, or auto
+    /// (found in the pictures)
     #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     pub(super) lattice: LatticeChoice,
 }
 
 #[derive(Args)]
 pub(super) struct Seed {
-    /// Seed of everything random
+    /// Seed of all random choices
     #[arg(long, default_value_t = 1)]
     pub(super) seed: u64,
 }
 
-/// Begin a model: choose its tile, the whole measurement or a part whose borders join
+/// Begin a model: choose its tile, which is all of the measurement or a part whose borders join
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -52,13 +58,13 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<()> {
+    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         let plan = tile_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
         if self.dry_run {
-            return tell.plan(&plan.summary());
+            return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        tell_tile(&plan.run(context)?, tell.found(found));
+        print_tile(&plan.run(context)?, console.found(found));
         Ok(())
     }
 }
@@ -78,7 +84,7 @@ pub(super) fn tile_plan(
     })
 }
 
-pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
+pub(super) fn print_tile(report: &tile::Report, console: Console) {
     let [height, width] = report.size;
     let seams = match &report.patch {
         Some(patch) => format!(
@@ -91,23 +97,23 @@ pub(super) fn tell_tile(report: &tile::Report, tell: Tell) {
         ),
         None => "the whole measurement, its borders do not join".to_owned(),
     };
-    tell.stage("tile", &format!("{width}x{height} {seams}"));
+    console.stage("tile", &format!("{width}x{height} {seams}"));
     let lattice = &report.lattice;
     let cells = WaveCounts(report.cells.clone()).cells();
     match lattice.vectors().len() {
         0 => {}
         _ if cells == 0 => {
-            tell.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
+            console.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
         }
-        1 => tell
+        1 => console
             .line(format!("          holds {cells} ribs, a period of {lattice:.1} texels (rows, columns)")),
-        _ => tell.line(format!(
+        _ => console.line(format!(
             "          holds {cells} cells of the lattice {lattice:.1} texels (rows, columns)"
         )),
     }
     let [texels, all] = [report.size, report.measurement_size].map(|[height, width]| (height * width) as f64);
     if texels < LITTLE * all {
-        tell.line(format!(
+        console.line(format!(
             "          {:.0} % of what was measured: --tile none gives enlargements all of it to draw on, and the clustering {:.1} times the texels",
             100.0 * texels / all,
             all / texels

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::{Error, Kind, Result};
+use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
 use btfkit::text::escaped;
@@ -8,9 +8,10 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
+use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
-use super::{Tell, as_json};
+use super::{Console, as_json};
 
 /// Check that a store is whole and undamaged; with --source, compare a measurement with its archive
 #[derive(Args)]
@@ -26,32 +27,36 @@ Examples:
   btf verify stores/*.zarr                          one line each, and a count
 The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
-    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); with several, each
-    /// gets one line
+    /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); if there are
+    /// several, each gets one line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
-    /// The model of an enlargement [default: where it was when the enlargement was made, or beside it]
+    /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
+    /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// The archive that the measurement was made of; repeat the option for each piece
+    /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
-    #[command(flatten)]
-    source: SourceArgs,
-    /// Print the report as JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    source: SourceArgs,
 }
 
 impl Verify {
-    pub(super) fn run(&self, context: &Context<'_>, tell: Tell) -> Result<Ended> {
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
+        if self.archive.is_empty() {
+            given.refuse_all::<SourceArgs>("without --source: it says how an archive is read", "")?;
+        }
         let [store] = self.stores.as_slice() else {
             if !self.archive.is_empty() {
                 return Err(Error::usage(format!("got --source for {} stores", self.stores.len()))
                     .hint("compare one store at a time with its archive"));
             }
             let name = |store: &PathBuf| store.display().to_string();
-            return each(&self.stores, name, self.json, context, tell, |store| {
+            return each(&self.stores, name, self.json, context, console, |store| {
                 let found = self.look(store, context)?;
                 let line =
                     if self.json { Line::Json(as_json(&found)?) } else { Line::Text(in_short(&found)) };
@@ -60,9 +65,9 @@ impl Verify {
         };
         let found = self.look(store, context)?;
         if self.json {
-            tell.plan(&as_json(&found)?)?;
+            console.plan(&as_json(&found)?)?;
         } else {
-            tell.text(&told(&found));
+            console.text(&text_of(&found));
         }
         judge(store, &found).map(|()| Ended::Done)
     }
@@ -85,7 +90,7 @@ fn in_short(found: &Found) -> String {
 }
 
 /// What was found, for people.
-fn told(found: &Found) -> String {
+fn text_of(found: &Found) -> String {
     let (mut text, findings, notes) = match found {
         Found::Measurement { views, report } => {
             (of_measurement(report, *views), &report.findings, &report.notes)
@@ -174,7 +179,7 @@ fn judge(store: &Path, found: &Found) -> Result<()> {
     };
     let damaged = findings.iter().find(|finding| !finding.missing);
     let Some(first) = damaged.or(findings.first()) else { return Ok(()) };
-    let kind = if damaged.is_some() { Kind::Input } else { Kind::Missing };
+    let kind = if damaged.is_some() { ErrorKind::Input } else { ErrorKind::Missing };
     let more = match findings.len() {
         1 => String::new(),
         count => format!(" (and {} more)", count - 1),

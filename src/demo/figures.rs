@@ -1,4 +1,4 @@
-//! The figures that the page tells: errors, sizes, and how near the enlarged picture comes to the tile.
+//! The figures of the page: errors, sizes, and how near the enlarged picture comes to the tile.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use crate::stage::{cluster, compare, normals, tile};
 use crate::store::model::Stage;
 use crate::store::model::field::FieldReport;
 
-/// Side of the squares whose means tell how patchy a picture is, texels.
+/// Side of the squares whose means show how patchy a picture is, texels.
 pub(super) const BLOCK: usize = 16;
 
-/// All that the page tells in figures.
+/// All figures of the page.
 pub(super) struct Figures {
     pub(super) tile: tile::Report,
     pub(super) cluster: cluster::Report,
@@ -93,7 +93,7 @@ impl Likeness {
     }
 }
 
-/// What is counted against what, bytes.
+/// What is compared with what, in bytes.
 pub(super) struct Ledger {
     pub(super) representatives: u64,
     pub(super) tile_index: u64,

@@ -1,4 +1,4 @@
-//! The whole method on a made material, and a page that tells the story of the run.
+//! The whole method on a synthetic material, and a page that explains the run with its pictures and figures.
 //!
 //! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
 //! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.
@@ -28,7 +28,7 @@ use crate::method::cluster::centre::CentreRule;
 use crate::method::cluster::lloyd::Limits;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
-use crate::sample::Kind;
+use crate::sample::MaterialKind;
 use crate::shape::Size;
 use crate::stage::cluster::Amount;
 use crate::stage::import::Shard;
@@ -45,7 +45,7 @@ pub struct Options {
     /// Folder for everything that is made.
     pub folder: PathBuf,
     /// Which material.
-    pub kind: Kind,
+    pub kind: MaterialKind,
 }
 
 /// What was made.
@@ -59,7 +59,7 @@ pub struct Report {
 
 /// Settings of the run; where the program has a default for one, that default.
 struct Settings {
-    kind: Kind,
+    kind: MaterialKind,
     sample: Size,
     directions: usize,
     clusters: usize,
@@ -71,7 +71,7 @@ struct Settings {
 }
 
 impl Settings {
-    fn new(kind: Kind) -> Self {
+    fn new(kind: MaterialKind) -> Self {
         Self {
             kind,
             sample: Size { height: 176, width: 176 },
@@ -88,8 +88,8 @@ impl Settings {
     /// Name of the material, as the program takes it.
     fn material(&self) -> &'static str {
         match self.kind {
-            Kind::Wood => "wood",
-            Kind::Leather => "leather",
+            MaterialKind::Wood => "wood",
+            MaterialKind::Leather => "leather",
         }
     }
 }
@@ -113,7 +113,7 @@ const PICTURE_BYTES: u64 = 40 << 20;
 /// Runs the demo, or goes on with it.
 ///
 /// # Errors
-/// [`crate::Kind::Recipe`] where the folder holds the demo of another material, and whatever the stages
+/// [`crate::ErrorKind::Recipe`] where the folder holds the demo of another material, and whatever the stages
 /// report.
 pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     run_with(&Settings::new(options.kind), &options.folder, context)
@@ -154,7 +154,10 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
 
     // These are made anew by every run: they read what the stages left and take a few seconds.
     let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
-    let compared = times.time("compare", false, || compare::run(&compare, context))?;
+    let compared = times.time("compare", false, || {
+        let (model, measurement) = compare::open(&compare)?;
+        compare::run(&model, &measurement, context)
+    })?;
     let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
     let figures = Figures::gather(&workshop, compared, places, context)?;
@@ -208,7 +211,7 @@ fn analyse(
     times: &mut Times,
     context: &Context<'_>,
 ) -> Result<()> {
-    let found = |stage: Stage| Model::open(model).and_then(|m| m.stage(stage)).is_ok_and(|s| s.is_some());
+    let found = |stage: Stage| Model::open(model).is_ok_and(|model| model.has(stage).unwrap_or(false));
     let (measurement, model) = (measurement.to_owned(), model.to_owned());
     times.time("tile", found(Stage::Tile), || {
         let (measurement, model) = (measurement.clone(), model.clone());
@@ -292,7 +295,7 @@ mod tests {
             directions: 13,
             clusters: 16,
             enlarged: Size::new(96, 80),
-            ..Settings::new(Kind::Wood)
+            ..Settings::new(MaterialKind::Wood)
         };
         let folder = tempfile::tempdir().unwrap();
         let stop = AtomicBool::new(false);

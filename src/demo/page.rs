@@ -27,13 +27,15 @@ pub(super) fn render(title: &str, sections: &[Section], embedded: &[Embedded]) -
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{page_title}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<header>\n\
          <h1>{page_title}</h1>\n\
-         <p>A Bidirectional Texture Function is a material photographed under all lights from all views. \
-         This page is one run of btfkit: it cut a seamless tile from such a measurement, reduced it to a few \
-         hundred measured reflectances, and covered a larger area with them by the method of Filip and \
-         Haindl (2007), BTF modelling using BRDF texels.</p>\n\
+         <p>A Bidirectional Texture Function (BTF) is a material photographed from many views under many \
+         lights. This page shows one run of btfkit, step by step. It cut a seamless tile from such a \
+         measurement, reduced the tile to a few hundred measured reflectances, and covered a larger area with \
+         them. The steps are those of Filip and Haindl, BTF modelling using BRDF texels (2007), with a newer \
+         way to enlarge beside theirs.</p>\n\
+         <p>Click a picture to see it in full.</p>\n\
          <nav>{links}</nav>\n</header>\n<main>\n{body}</main>\n\
-         <footer>btfkit {version}. Equation numbers are those of the paper. All pictures lie beside this \
-         page as PNG, in {pictures}/.</footer>\n</body>\n</html>\n",
+         <footer>btfkit {version}. All pictures are also beside this page as PNG, in the folder \
+         {pictures}.</footer>\n</body>\n</html>\n",
         style = include_str!("page.css"),
         version = env!("CARGO_PKG_VERSION"),
         pictures = names::PICTURES,
@@ -63,8 +65,10 @@ const TEXELS_SHOWN: usize = 300;
 fn figure(shot: &Shot, Embedded { address, size }: &Embedded) -> String {
     let class = if size.height.max(size.width) < TEXELS_SHOWN { " class=\"texels\"" } else { "" };
     format!(
-        "<figure><img{class} src=\"{address}\" width=\"{}\" height=\"{}\" alt=\"{}\">\
+        "<figure><a href=\"{}/{}.png\"><img{class} src=\"{address}\" width=\"{}\" height=\"{}\" alt=\"{}\"></a>\
          <figcaption>{}</figcaption></figure>\n",
+        names::PICTURES,
+        escape(&shot.file),
         size.width,
         size.height,
         escape(&shot.alt),
@@ -130,8 +134,8 @@ mod tests {
         let page = render("wood", &sections, &embedded);
         for name in ["one", "two", "three", "four"] {
             let figure = format!(
-                "src=\"data:{name}\" width=\"1\" height=\"1\" alt=\"&quot;{name}&quot; &amp; more\">\
-                 <figcaption><b>{name}</b>"
+                "<a href=\"pictures/{name}.png\"><img class=\"texels\" src=\"data:{name}\" width=\"1\" height=\"1\" \
+                 alt=\"&quot;{name}&quot; &amp; more\"></a><figcaption><b>{name}</b>"
             );
             assert!(page.contains(&figure), "{figure}");
         }

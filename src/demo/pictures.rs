@@ -61,7 +61,7 @@ pub(super) enum Subject {
     PatchRepeated,
     /// The tile repeated.
     TileRepeated,
-    /// The tile's clusters in false colours.
+    /// The tile's clusters in false colours, from dark to light ones.
     Clusters,
     /// The tile by the model.
     Modelled,
@@ -174,7 +174,11 @@ impl Workshop {
             Subject::Seams => false_color::seams(&measured(tile)?, &self.cut.beyond),
             Subject::PatchRepeated => measured(&self.cut.patch.uncut())?.repeated(repeats),
             Subject::TileRepeated => measured(tile)?.repeated(repeats),
-            Subject::Clusters => false_color::index(tile.size, &self.tile_index),
+            Subject::Clusters => {
+                let [view, light] = Lit::REFERENCE.directions();
+                let colors = cluster_colors(&self.model, view, light)?;
+                false_color::index_by_lightness(tile.size, &self.tile_index, &colors)
+            }
             Subject::Modelled => self.modelled(tile.size, &self.tile_index, Lit::REFERENCE)?,
             Subject::Difference => {
                 let modelled = self.modelled(tile.size, &self.tile_index, Lit::REFERENCE)?;
@@ -206,7 +210,7 @@ impl Workshop {
         of_measured_tile(&self.measurement, tile, view, light, context)
     }
 
-    /// Values of the model, (27).
+    /// Values of the model, equation (27) of the paper.
     fn modelled(&self, size: Size, index: &[u16], lit: Lit) -> Result<Picture> {
         let [view, light] = lit.directions();
         look_up(size, index, &cluster_colors(&self.model, view, light)?)

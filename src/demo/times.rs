@@ -10,6 +10,7 @@ use crate::disk::mapped::MappedFile;
 use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
 use crate::run::recipe;
+use crate::run::recipe::Made;
 
 /// A step and the time that it took.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -33,7 +34,7 @@ impl Times {
     /// Reads the record at `path`, or begins one.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where the folder holds another demo.
+    /// [`crate::ErrorKind::Recipe`] where the folder holds another demo.
     pub(super) fn open(path: PathBuf, recipe: Value) -> Result<Self> {
         let steps = match MappedFile::open(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
@@ -41,7 +42,7 @@ impl Times {
             Ok(bytes) => {
                 let damaged = |error| Error::input(format!("{}: {error}", path.display()));
                 let found: Value = serde_json::from_slice(bytes.as_ref()).map_err(damaged)?;
-                recipe::expect_same(&path, &found.as_object().cloned().unwrap_or_default(), &recipe)?;
+                Made::of(&found.as_object().cloned().unwrap_or_default()).expect(&path, &recipe)?;
                 serde_json::from_value(found.get("steps").cloned().unwrap_or_default()).map_err(damaged)?
             }
         };
@@ -81,7 +82,7 @@ impl Times {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
 
     fn wait(milliseconds: u64) {
         std::thread::sleep(std::time::Duration::from_millis(milliseconds));
@@ -120,7 +121,7 @@ mod tests {
             Times::open(folder.path().join("demo.json"), json!({"material": material})).map(|_| ())
         };
         open("wood").unwrap();
-        assert_eq!(open("leather").unwrap_err().kind(), Kind::Recipe);
+        assert_eq!(open("leather").unwrap_err().kind(), ErrorKind::Recipe);
         open("wood").unwrap();
     }
 }

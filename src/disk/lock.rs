@@ -36,7 +36,7 @@ impl Lock {
     /// Waits for the lock `name` of the store at `path`; says so where that takes long, and gives up on a stop.
     ///
     /// # Errors
-    /// [`crate::Kind::Stopped`] on a stop, [`crate::Kind::Io`] where there can be no lock file.
+    /// [`crate::ErrorKind::Stopped`] on a stop, [`crate::ErrorKind::Io`] where there can be no lock file.
     pub(crate) fn wait(path: &Path, name: &str, context: &Context<'_>) -> Result<Self> {
         Self::take(path, name, false, context)
     }
@@ -128,9 +128,14 @@ fn holder(store: &Path, place: &Path, file: &mut File) -> String {
     format!("{}{what}: {whom} has been working on it{since}", store.display())
 }
 
-/// Whether a file is one of these.
+/// What locks are of: stages of a model, and the writing of a store by its recipe.
+const NAMES: [&str; 6] = ["-writing", "-tile", "-cluster", "-normals", "-fit", "-appearance"];
+
+/// Whether a file is one of these, by its whole name.
 pub(crate) fn is_lock(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(PREFIX))
+    let name = path.file_name().and_then(|name| name.to_str());
+    let what = name.and_then(|name| name.strip_prefix(PREFIX));
+    what.is_some_and(|what| what.is_empty() || NAMES.contains(&what))
 }
 
 #[cfg(test)]
@@ -140,7 +145,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
     use crate::run::progress::{Counted, Progress, Silent};
 
     /// Stops the work when it is told to wait.
@@ -165,7 +170,7 @@ mod tests {
         let _held = Lock::wait(folder.path(), "-fit", &quiet).unwrap();
         let impatient = Impatient(&stop, Mutex::default());
         let context = Context::new(&impatient, &stop, 1, 1 << 20).unwrap();
-        assert_eq!(Lock::wait(folder.path(), "-fit", &context).unwrap_err().kind(), Kind::Stopped);
+        assert_eq!(Lock::wait(folder.path(), "-fit", &context).unwrap_err().kind(), ErrorKind::Stopped);
         let told = impatient.1.into_inner().unwrap();
         let process = format!("process {} on {}", std::process::id(), host());
         assert!(told.contains(&process) && told.contains("(stage fit)"), "{told}");
@@ -203,7 +208,7 @@ mod tests {
         for lock in [first, second] {
             stop.store(false, Ordering::Relaxed);
             let kind = Lock::wait(folder.path(), "", &context).unwrap_err().kind();
-            assert_eq!(kind, Kind::Stopped);
+            assert_eq!(kind, ErrorKind::Stopped);
             assert!(folder.path().join(".lock").exists());
             drop(lock);
         }

@@ -11,7 +11,7 @@ use std::sync::Mutex;
 
 use super::mapped::{self, MappedFile, open};
 use super::temporary::{self, Temporary, folder_of, write_file};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::Existing;
 
 /// The file by which a folder is known as a Zarr store.
@@ -24,7 +24,7 @@ impl Existing {
     /// Refuses a name that is taken, before any work: for results that are not compared.
     ///
     /// # Errors
-    /// [`Kind::Recipe`].
+    /// [`ErrorKind::Recipe`].
     pub fn expect_free(self, path: &Path) -> Result<()> {
         match self {
             Self::Keep if is_there(path) => Err(taken(path, "exists")),
@@ -133,11 +133,11 @@ impl Ready {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`Kind::Recipe`] where another process has made another file of this name meanwhile.
+    /// [`ErrorKind::Recipe`] where another process has made another file of this name meanwhile.
     pub fn publish(self) -> Result<Made> {
         match self.temporary {
             None => Ok(Made::Found),
-            Some(temporary) => settle(temporary.path(), &self.path, self.existing),
+            Some(temporary) => put_in_place(temporary.path(), &self.path, self.existing),
         }
     }
 }
@@ -145,7 +145,7 @@ impl Ready {
 /// Writes a file by `write` beside the place that it is to have, or compares it with the one that is there.
 ///
 /// # Errors
-/// Those of `write`, and [`Kind::Recipe`] where another file has the name.
+/// Those of `write`, and [`ErrorKind::Recipe`] where another file has the name.
 pub fn prepare(
     path: &Path,
     existing: Existing,
@@ -210,7 +210,7 @@ pub fn write_whole(
 /// Refuses a place inside of a store, which a result would damage.
 ///
 /// # Errors
-/// [`Kind::Usage`], with the store.
+/// [`ErrorKind::Usage`], with the store.
 pub fn expect_outside_stores(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
@@ -248,7 +248,7 @@ fn compare(path: &Path, write: impl FnOnce(&mut Output) -> Result<()>) -> Result
     let mut output = Output { to: To::Compare(file) };
     let written = write(&mut output);
     let different =
-        |error: &Error| error.kind() == Kind::Io && error.to_string().contains(&Different.to_string());
+        |error: &Error| error.kind() == ErrorKind::Io && error.to_string().contains(&Different.to_string());
     match written {
         Err(error) if different(&error) => return Err(taken(path, &Different.to_string())),
         other => other?,
@@ -337,8 +337,8 @@ fn different_folder(path: &Path) -> Error {
 /// Fills a folder by `write`; it gets its name when that is done.
 ///
 /// # Errors
-/// Those of `write`, and [`Kind::Recipe`] where there is another folder. Only one that holds nothing but files that the
-/// new one has too is ever replaced.
+/// Those of `write`, and [`ErrorKind::Recipe`] where there is another folder. Only one that holds nothing but files
+/// that the new one has too is ever replaced.
 pub fn write_whole_folder(
     path: &Path,
     existing: Existing,
@@ -395,8 +395,8 @@ pub fn prepare_bytes(path: &Path, existing: Existing, bytes: &[u8]) -> Result<Re
 /// the second finds it done.
 ///
 /// # Errors
-/// [`Kind::Recipe`] where another file has the name.
-pub fn settle(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
+/// [`ErrorKind::Recipe`] where another file has the name.
+pub fn put_in_place(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
     let failed = |error| Error::io("write", path, error);
     if existing == Existing::Replace {
         existing.expect_free(path)?;
@@ -406,7 +406,7 @@ pub fn settle(temporary: &Path, path: &Path, existing: Existing) -> Result<Made>
         Ok(()) => Ok(Made::Written),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
             compare_files(temporary, path).map(|()| Made::Found).map_err(|error| match error.kind() {
-                Kind::Recipe => meanwhile(path),
+                ErrorKind::Recipe => meanwhile(path),
                 _ => error,
             })
         }

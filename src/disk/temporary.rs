@@ -1,6 +1,7 @@
 //! Files that are written: to a temporary name, synced, and given their own name when they are whole.
 //!
-//! A kill leaves a temporary file, which the next run sweeps, and never a torn one that a later run would take for done.
+//! A kill leaves a temporary file, which the next run sweeps, and never a torn one that a later run would take for
+//! done.
 #![allow(clippy::disallowed_methods)] // they are wrapped here
 
 use std::collections::hash_map::RandomState;
@@ -186,7 +187,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 /// away first: at no time does a part of it look like something unfinished.
 ///
 /// # Errors
-/// [`crate::Kind::Recipe`] where it holds a file of another's.
+/// [`crate::ErrorKind::Recipe`] where it holds a file of another's.
 pub(crate) fn remove_folder(path: &Path, is_own: impl Fn(&Path) -> bool) -> Result<()> {
     let mut folders = vec![path.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -220,9 +221,18 @@ pub(crate) fn temporary_name(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{TEMPORARY}{}-{}-{random:08x}", host(), std::process::id()))
 }
 
-/// Whether a file is a temporary one of a writer, dead or alive.
+/// Whether a file is a temporary one of a writer, dead or alive, by its whole name (see [`temporary_name`]).
 pub(crate) fn is_temporary(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().contains(TEMPORARY))
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    let writer =
+        name.as_deref().filter(|name| name.starts_with('.')).and_then(|name| name.rsplit_once(TEMPORARY));
+    writer.is_some_and(|(_, writer)| {
+        let all = |text: &str, is: fn(&u8) -> bool| !text.is_empty() && text.bytes().all(|byte| is(&byte));
+        let mut parts = writer.rsplitn(3, '-');
+        parts.next().is_some_and(|random| random.len() <= 8 && all(random, u8::is_ascii_hexdigit))
+            && parts.next().is_some_and(|pid| all(pid, u8::is_ascii_digit))
+            && parts.next().is_some()
+    })
 }
 
 /// Removes a temporary file or folder that nobody holds.

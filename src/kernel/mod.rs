@@ -56,6 +56,25 @@ impl Kernel {
     }
 }
 
+/// The value of one of three calls, by the kernel: the plain one, one compiled with AVX2, one compiled with AVX-512.
+/// Where longer vectors gain nothing, the last two are the same. All choices between kernels are made here.
+macro_rules! dispatch {
+    ($kernel:expr; $plain:expr, $avx2:expr, $avx512:expr $(,)?) => {
+        match $kernel {
+            $crate::kernel::Kernel::Plain => $plain,
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            // SAFETY: a kernel is only ever constructed after its features were found.
+            $crate::kernel::Kernel::Avx2 => unsafe { $avx2 },
+            #[cfg(target_arch = "x86_64")]
+            #[allow(unsafe_code)]
+            // SAFETY: as above; what has AVX-512 has AVX2.
+            $crate::kernel::Kernel::Avx512 => unsafe { $avx512 },
+        }
+    };
+}
+pub(crate) use dispatch;
+
 /// Defines a function for each kernel from one body of plain Rust: compiled once for the target and once more for
 /// each set of instructions, chosen by `kernel`. The body is what the compiler vectorises.
 macro_rules! compiled_for_each_kernel {
@@ -72,17 +91,7 @@ macro_rules! compiled_for_each_kernel {
             fn avx512($($argument: $kind),*) $(-> $result)? {
                 $body($($argument),*)
             }
-            match kernel {
-                $crate::kernel::Kernel::Plain => $body($($argument),*),
-                #[cfg(target_arch = "x86_64")]
-                #[allow(unsafe_code)]
-                // SAFETY: a kernel is only ever constructed after its features were found.
-                $crate::kernel::Kernel::Avx2 => unsafe { avx2($($argument),*) },
-                #[cfg(target_arch = "x86_64")]
-                #[allow(unsafe_code)]
-                // SAFETY: as above.
-                $crate::kernel::Kernel::Avx512 => unsafe { avx512($($argument),*) },
-            }
+            $crate::kernel::dispatch!(kernel; $body($($argument),*), avx2($($argument),*), avx512($($argument),*))
         }
     };
 }

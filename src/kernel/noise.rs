@@ -6,7 +6,7 @@ use super::philox::{MULTIPLIER, WEYL};
 
 /// Where a row of normals lies.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct Site {
     /// Key of the hash.
     pub key: [u32; 2],
     /// Domain of the hash.
@@ -32,7 +32,7 @@ const HASHED: usize = 64;
 const PART: usize = 32;
 
 #[inline(always)]
-fn normals_body(place: Place, out: &mut [f32]) {
+fn normals_body(place: Site, out: &mut [f32]) {
     let mut words = [0; STRIP];
     let mut group = (place.first_column >> 2) as u32;
     // The row may begin inside a group.
@@ -63,7 +63,7 @@ fn normals_body(place: Place, out: &mut [f32]) {
 /// The words of `groups` groups. As [`philox4x32`], on 64-bit lanes: products need no shuffles, and what is left in the
 /// upper halves does not count.
 #[inline(always)]
-fn hash(place: Place, first: u32, groups: usize, words: &mut [u32; STRIP]) {
+fn hash(place: Site, first: u32, groups: usize, words: &mut [u32; STRIP]) {
     let mut planes = [[0_u32; STRIP / GROUP]; GROUP];
     let [w0, w1, w2, w3] = &mut planes;
     for (g, (((w0, w1), w2), w3)) in w0[..groups].iter_mut().zip(w1).zip(w2).zip(w3).enumerate() {
@@ -169,7 +169,7 @@ fn tail(word: u32) -> f32 {
 compiled_for_each_kernel! {
     /// Standard normals of successive columns of a row, each within 1e-6 of the exact quantile of its word, and at most
     /// 6.4 in magnitude. Word `c % 4` of the hash of (row, c / 4 rounded down, channel, domain) belongs to column c.
-    pub fn normals(place: Place, out: &mut [f32]) = normals_body
+    pub fn normals(place: Site, out: &mut [f32]) = normals_body
 }
 
 #[cfg(test)]
@@ -179,8 +179,8 @@ mod tests {
     use crate::kernel::philox::philox4x32;
     use crate::random::{normal_quantile, unit_interval};
 
-    fn place(row: i32, first_column: i32) -> Place {
-        Place { key: [7, 9], domain: 3, row, first_column, channel: 1 }
+    fn place(row: i32, first_column: i32) -> Site {
+        Site { key: [7, 9], domain: 3, row, first_column, channel: 1 }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::shape::Size;
 /// Writes the rows that `row` gives from the top down.
 ///
 /// # Errors
-/// Those of `row`, [`crate::Kind::Io`] where the system refuses to write, and what the encoder refuses.
+/// Those of `row`, [`crate::ErrorKind::Io`] where the system refuses to write, and what the encoder refuses.
 pub(super) fn write(
     mut output: impl Write,
     encoding: Encoding,

@@ -64,7 +64,7 @@ impl Ending {
     /// The format that a name asks for, of those that are allowed.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`] for any other ending; the message lists those that are allowed.
+    /// [`crate::ErrorKind::Usage`] for any other ending; the message lists those that are allowed.
     pub fn of(path: &Path, allowed: &[Self]) -> Result<Self> {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
         let named = |format: &&Self| ending.as_deref().is_some_and(|name| format.endings().contains(&name));
@@ -131,7 +131,7 @@ impl Encoding {
     /// With another quality or depth, where they are asked for.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`] where the format does not have them.
+    /// [`crate::ErrorKind::Usage`] where the format does not have them.
     pub fn with(mut self, bits: Option<Bits>, quality: Option<u8>) -> Result<Self> {
         let name = self.ending.name();
         if let Some(quality) = quality {
@@ -153,7 +153,7 @@ impl Encoding {
     /// Checks that the format takes pictures of this size.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`] with the limit.
+    /// [`crate::ErrorKind::Usage`] with the limit.
     pub fn check_size(self, size: Size) -> Result<()> {
         let name = self.ending.name();
         let most = self.ending.most_side();
@@ -199,7 +199,7 @@ impl Encoding {
     /// Checks that memory is allowed for a picture of this size, beside `least` bytes that reading its rows takes.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`] with what it needs.
+    /// [`crate::ErrorKind::Usage`] with what it needs.
     pub fn check_memory(self, size: Size, least: u64, allowed: Allowance) -> Result<()> {
         let needed = self.memory_bytes(size).saturating_add(least);
         if self.ending.streams() {
@@ -246,7 +246,7 @@ mod tests {
             encoding(name).check_size(Size::new(side, 1)).unwrap();
             for size in [Size::new(1, side + 1), Size::new(side + 1, 1)] {
                 let error = encoding(name).check_size(size).unwrap_err();
-                assert_eq!(error.kind(), crate::Kind::Usage);
+                assert_eq!(error.kind(), crate::ErrorKind::Usage);
                 assert!(error.to_string().contains(&side.to_string()), "{error}");
             }
         }

@@ -14,6 +14,24 @@ pub fn index(size: Size, index: &[u16]) -> Picture {
     Picture::display(size, index.iter().map(color).collect())
 }
 
+/// Each cluster in a colour that says how light it is among all of them, from dark blue over green to light yellow.
+/// `colors` are the linear RGB of the clusters.
+pub fn index_by_lightness(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Picture {
+    let luminance = |cluster: usize| {
+        let [red, green, blue] = colors[cluster];
+        0.2126 * red + 0.7152 * green + 0.0722 * blue
+    };
+    let mut order: Vec<usize> = (0..colors.len()).collect();
+    order.sort_by(|&a, &b| luminance(a).total_cmp(&luminance(b)));
+    let mut ramp = vec![[0.0; 3]; colors.len()];
+    for (rank, &cluster) in order.iter().enumerate() {
+        let at = rank as f64 / colors.len().max(2).saturating_sub(1) as f64;
+        ramp[cluster] = hsv(0.68 - 0.53 * at, 0.85 - 0.35 * at, 0.35 + 0.65 * at);
+    }
+    let color = |&cluster: &u16| ramp.get(usize::from(cluster)).copied().unwrap_or_default();
+    Picture::display(size, index.iter().map(color).collect())
+}
+
 /// Normals as (n + 1) / 2: x to the right in red, y upwards in green, z towards the viewer in blue.
 pub fn normals(size: Size, normals: &[[f32; 3]]) -> Picture {
     Picture::display(size, normals.iter().map(|normal| normal.map(|n| (n + 1.0) / 2.0)).collect())
@@ -57,4 +75,19 @@ fn hsv(hue: f64, saturation: f64, value: f64) -> [f32; 3] {
         let k = (n + hue * 6.0) % 6.0;
         (value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)) as f32
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lighter_clusters_have_lighter_colours() {
+        // Green counts more than red, and red more than blue.
+        let colors = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3], [1.0, 0.0, 0.0]];
+        let picture = index_by_lightness(Size::new(1, 4), &[2, 1, 3, 0], &colors);
+        let lightest: Vec<f32> =
+            picture.pixels.iter().map(|pixel| pixel.iter().copied().fold(0.0, f32::max)).collect();
+        assert!(lightest.is_sorted_by(|a, b| a < b), "{lightest:?}");
+    }
 }

@@ -157,7 +157,7 @@ impl Picture {
     ///
     /// # Errors
     /// An ending that is not known, a size that the format does not take, those of writing, and
-    /// [`crate::Kind::Recipe`] where another file is.
+    /// [`crate::ErrorKind::Recipe`] where another file is.
     pub fn write(&self, path: &Path, existing: Existing) -> Result<Made> {
         self.prepare(path, existing)?.publish()
     }

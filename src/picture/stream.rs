@@ -23,7 +23,8 @@ const PIECE_BYTES: usize = 64 << 10;
 /// PNG and EXR are written as the rows come; of other formats all rows are gathered first.
 ///
 /// # Errors
-/// A size that the format does not take, those of `row` and of writing, and [`crate::Kind::Recipe`] where another file is.
+/// A size that the format does not take, those of `row` and of writing, and [`crate::ErrorKind::Recipe`] where another
+/// file is.
 pub fn prepare(
     path: &Path,
     encoding: Encoding,

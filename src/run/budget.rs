@@ -1,16 +1,21 @@
 //! What `--memory` allows: the program's own share, what a stage needs at least, and what the system leaves.
 
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, NO_THREADS, Result};
 use crate::words::counted;
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
 pub const OWN_BYTES: u64 = 12 << 20;
+
+/// The least stack of the main thread.
+const STACK_BYTES: u64 = 256 << 10;
 
 /// Memory that the work may use, and who says so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Allowance {
     /// Bytes.
     pub bytes: u64,
+    /// What is enough for all that is to be done, where that is known to be more than what is asked for first; else 0.
+    pub enough: u64,
     /// Whether the system leaves no more (`ulimit -v`), whatever `--memory` says.
     pub by_system: bool,
 }
@@ -19,16 +24,18 @@ impl Allowance {
     /// What `--memory` allows and the system leaves.
     pub fn new(option_bytes: u64) -> Self {
         match address_space_left() {
-            Some(left) if left < option_bytes => Self { bytes: left, by_system: true },
-            _ => Self { bytes: option_bytes, by_system: false },
+            Some(left) if left < option_bytes => Self { bytes: left, enough: 0, by_system: true },
+            _ => Self { bytes: option_bytes, enough: 0, by_system: false },
         }
     }
 
     /// Checks what cannot be done without against what is allowed. `otherwise` is what else helps, if anything does.
     ///
     /// # Errors
-    /// With what it needs and what to do: [`Kind::Usage`], or [`Kind::Internal`] where the system leaves no more.
+    /// With what it needs and what to do: [`ErrorKind::Usage`], or [`ErrorKind::Internal`] where the system leaves no
+    /// more.
     pub fn require(self, what: &str, needed: u64, otherwise: &str) -> Result<()> {
+        let needed = needed.max(OWN_BYTES);
         if needed <= self.bytes {
             return Ok(());
         }
@@ -36,10 +43,15 @@ impl Allowance {
         let found = format!("{what} takes {mib} MiB of memory, {} allowed", amount(self.bytes));
         let or = if otherwise.is_empty() { String::new() } else { format!("; or {otherwise}") };
         Err(if self.by_system {
-            Error::new(Kind::Internal, format!("{found} by the limit of the address space"))
+            Error::new(ErrorKind::Internal, format!("{found} by the limit of the address space"))
                 .hint(format!("raise that limit (ulimit -v){or}"))
         } else {
-            Error::usage(found).hint(format!("--memory {mib}MiB, or more, allows it{or}"))
+            Error::usage(found).hint(match self.enough.div_ceil(1 << 20) {
+                enough if enough > mib => {
+                    format!("--memory {enough}MiB, or more, allows it and what follows{or}")
+                }
+                _ => format!("--memory {mib}MiB, or more, allows it{or}"),
+            })
         })
     }
 }
@@ -56,8 +68,8 @@ fn amount(bytes: u64) -> String {
 
 /// The error of threads that the system does not start.
 pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
-    Error::new(Kind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
-        .hint("choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)")
+    Error::new(ErrorKind::Io, format!("cannot start {}: {error}", counted(threads, "thread")))
+        .hint(NO_THREADS)
 }
 
 /// Bytes that the process may still map where its address space is limited (`ulimit -v`); half of what is left, since
@@ -67,6 +79,28 @@ pub fn address_space_left() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let used = std::fs::read_to_string("/proc/self/statm").ok()?;
     space_left(&limits, &used)
+}
+
+/// Checks that the main thread has a stack to work on (`ulimit -s`): without one the program would end without a word.
+///
+/// # Errors
+/// [`ErrorKind::Internal`].
+#[allow(clippy::disallowed_methods)] // the system's own files
+pub fn expect_stack() -> Result<()> {
+    let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
+    match limit(&limits, "Max stack size") {
+        Some(bytes) if bytes < STACK_BYTES => {
+            let found =
+                format!("the stack is limited to {} KiB, {} are needed", bytes >> 10, STACK_BYTES >> 10);
+            Err(Error::new(ErrorKind::Internal, found).hint("raise that limit (ulimit -s 8192)"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A limit of the process, of its table of limits; none where there is no limit.
+fn limit(limits: &str, name: &str) -> Option<u64> {
+    limits.lines().find_map(|line| line.strip_prefix(name))?.split_whitespace().next()?.parse().ok()
 }
 
 /// Lets all threads allocate from one arena: each of its own reserves 64 MiB of address space, so that with `ulimit -v`
@@ -86,8 +120,7 @@ pub fn spare_address_space() {
 
 fn space_left(limits: &str, used: &str) -> Option<u64> {
     const PAGE_BYTES: u64 = 4096;
-    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
-    let limit: u64 = line.split_whitespace().next()?.parse().ok()?;
+    let limit = limit(limits, "Max address space")?;
     let pages: u64 = used.split_whitespace().next()?.parse().ok()?;
     Some(limit.saturating_sub(pages * PAGE_BYTES) / 2)
 }
@@ -108,8 +141,9 @@ mod tests {
 
     #[test]
     fn what_is_needed_is_said() {
-        let by =
-            |bytes, by_system| Allowance { bytes, by_system }.require("a tile", 70 << 20, "make it smaller");
+        let by = |bytes, by_system| {
+            Allowance { bytes, enough: 0, by_system }.require("a tile", 70 << 20, "make it smaller")
+        };
         let told = |bytes| by(bytes, false).unwrap_err().to_string();
         assert_eq!(told(64 << 20), "a tile takes 70 MiB of memory, 64 MiB are allowed");
         assert_eq!(told(1 << 20), "a tile takes 70 MiB of memory, 1 MiB is allowed");
@@ -119,7 +153,7 @@ mod tests {
         let hint = by(1, false).unwrap_err().guidance().unwrap().to_owned();
         assert_eq!(hint, "--memory 70MiB, or more, allows it; or make it smaller");
         let error = by(64 << 20, true).unwrap_err();
-        assert_eq!(error.kind(), Kind::Internal);
+        assert_eq!(error.kind(), ErrorKind::Internal);
         let hint = error.guidance().unwrap();
         assert!(hint.contains("ulimit -v") && !hint.contains("--memory"), "{hint}");
         assert!(by(70 << 20, false).is_ok());

@@ -8,7 +8,7 @@ pub mod recipe;
 pub mod units;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::error::{Error, Result};
 use crate::run::budget::Allowance;
@@ -37,6 +37,7 @@ pub struct Context<'a> {
     /// What to do about what lies where a result is to be.
     pub existing: Existing,
     memory_by_system: bool,
+    memory_enough: AtomicU64,
     computing: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
@@ -61,6 +62,7 @@ impl<'a> Context<'a> {
             memory_bytes,
             existing: Existing::Keep,
             memory_by_system: false,
+            memory_enough: AtomicU64::new(0),
             computing: Arc::default(),
             pool,
         })
@@ -80,7 +82,13 @@ impl<'a> Context<'a> {
 
     /// Memory that the work may use, the program's own included, and who says so.
     pub fn memory(&self) -> Allowance {
-        Allowance { bytes: self.memory_bytes, by_system: self.memory_by_system }
+        let enough = self.memory_enough.load(Ordering::Relaxed);
+        Allowance { bytes: self.memory_bytes, enough, by_system: self.memory_by_system }
+    }
+
+    /// Takes note of what is enough for all that is to be done, so that it is told at once where memory is short.
+    pub fn tell_enough(&self, bytes: u64) {
+        self.memory_enough.store(bytes, Ordering::Relaxed);
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.

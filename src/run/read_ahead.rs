@@ -23,8 +23,8 @@ pub fn in_flight(allowed_bytes: u64, value_bytes: u64) -> usize {
 /// items do.
 ///
 /// # Errors
-/// Those of `work`, which is given those of `read`, and [`crate::Kind::Stopped`] once a stop is asked for;
-/// [`crate::Kind::Io`] where the system starts no thread.
+/// Those of `work`, which is given those of `read`, and [`crate::ErrorKind::Stopped`] once a stop is asked for;
+/// [`crate::ErrorKind::Io`] where the system starts no thread.
 pub fn with<I: Send, T: Send, R>(
     context: &Context<'_>,
     in_flight: usize,
@@ -78,7 +78,7 @@ pub fn for_each<I: Send, T: Send>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::{Error, Kind};
+    use crate::error::{Error, ErrorKind};
     use crate::run::progress::Silent;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -151,7 +151,7 @@ mod tests {
             assert_eq!((error.unwrap_err().to_string(), used), ("item 5".to_owned(), 5));
             assert_eq!(read.swap(0, Ordering::SeqCst), 6);
             let error = for_each(&context(&stop), in_flight, 0..1000, count, |_| Err(Error::usage("work")));
-            assert_eq!(error.unwrap_err().kind(), Kind::Usage);
+            assert_eq!(error.unwrap_err().kind(), ErrorKind::Usage);
             assert!(read.into_inner() <= in_flight.max(2));
         }
     }
@@ -167,7 +167,7 @@ mod tests {
                 Ok(item)
             };
             let error = for_each(&context(&stop), in_flight, 0.., stopping, |_| Ok(())).unwrap_err();
-            assert_eq!(error.kind(), Kind::Stopped);
+            assert_eq!(error.kind(), ErrorKind::Stopped);
             stop.store(false, Ordering::SeqCst);
         }
     }

@@ -5,7 +5,9 @@
 
 use std::path::Path;
 
-use serde_json::{Map, Value};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use crate::error::{Error, Result};
@@ -13,6 +15,51 @@ use crate::error::{Error, Result};
 /// Version of the methods, part of every recipe: raised when a change makes other bytes, so that a newer
 /// program does not go on with what an older one left half-made.
 pub const METHOD: u64 = 1;
+
+/// The settings of a result, beside which its recipe holds the stage that made it and the version of the method.
+pub trait Recipe: Serialize + DeserializeOwned {
+    /// What makes the result.
+    const STAGE: &'static str;
+
+    /// Version of its method: raised when a change makes other bytes of this stage alone.
+    const METHOD: u64 = METHOD;
+
+    /// The recipe as it is stored.
+    ///
+    /// # Errors
+    /// [`crate::ErrorKind::Internal`] for settings that are no JSON object.
+    fn to_value(&self) -> Result<Value> {
+        let failed = |what: &str| Error::internal(format!("recipe of {}: {what}", Self::STAGE));
+        let mut recipe = serde_json::to_value(self).map_err(|error| failed(&error.to_string()))?;
+        let members = recipe.as_object_mut().ok_or_else(|| failed("no object"))?;
+        members.insert("stage".to_owned(), json!(Self::STAGE));
+        members.insert("method".to_owned(), json!(Self::METHOD));
+        Ok(recipe)
+    }
+
+    /// The settings in a stored recipe.
+    ///
+    /// # Errors
+    /// Says what does not belong there, or is missing.
+    fn from_value(recipe: &Value) -> std::result::Result<Self, String> {
+        let mut settings = recipe.as_object().cloned().unwrap_or_default();
+        match settings.remove("stage") {
+            Some(stage) if stage == Self::STAGE => {}
+            found => {
+                return Err(format!(
+                    "stage: got {}, expected \"{}\"",
+                    found.unwrap_or_default(),
+                    Self::STAGE
+                ));
+            }
+        }
+        match settings.remove("method") {
+            Some(method) if method.is_u64() => {}
+            found => return Err(format!("method: got {}, expected a number", found.unwrap_or_default())),
+        }
+        serde_json::from_value(Value::Object(settings)).map_err(|error| error.to_string())
+    }
+}
 
 /// The digest of a recipe: SHA-256 of its JSON with sorted keys, in hexadecimal.
 pub fn digest(recipe: &Value) -> String {
@@ -41,18 +88,35 @@ pub(crate) fn canonical(value: &Value) -> Value {
     }
 }
 
-/// Checks that what lies at `path` was made by the same recipe: `found` are its attributes.
-///
-/// # Errors
-/// Names the first setting that differs.
-pub fn expect_same(path: &Path, found: &Map<String, Value>, recipe: &Value) -> Result<()> {
-    if found.get("digest").and_then(Value::as_str) == Some(digest(recipe).as_str()) {
-        return Ok(());
+/// By what a result in place was made.
+#[derive(Clone, Copy, Debug)]
+pub struct Made<'a> {
+    /// Digest of the recipe.
+    pub digest: &'a str,
+    /// The recipe.
+    pub recipe: &'a Value,
+}
+
+impl<'a> Made<'a> {
+    /// What attributes say of it.
+    pub fn of(attributes: &'a Map<String, Value>) -> Self {
+        let digest = attributes.get("digest").and_then(Value::as_str).unwrap_or_default();
+        Self { digest, recipe: attributes.get("recipe").unwrap_or(&Value::Null) }
     }
-    let old = found.get("recipe").unwrap_or(&Value::Null);
-    let difference = first_difference(old, recipe, "").unwrap_or_else(|| "by another version".to_owned());
-    Err(Error::recipe(format!("{} was made by another recipe: {difference}", path.display()))
-        .hint("choose another name for the result, or make this one anew by --force"))
+
+    /// Checks that the result, at `path`, was made by this recipe.
+    ///
+    /// # Errors
+    /// Names the first setting that differs.
+    pub fn expect(self, path: &Path, recipe: &Value) -> Result<()> {
+        if self.digest == digest(recipe) {
+            return Ok(());
+        }
+        let difference =
+            first_difference(self.recipe, recipe, "").unwrap_or_else(|| "by another version".to_owned());
+        Err(Error::recipe(format!("{} was made by another recipe: {difference}", path.display()))
+            .hint("choose another name for the result, or make this one anew by --force"))
+    }
 }
 
 fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
@@ -125,7 +189,6 @@ fn is_digest(text: &str) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn the_digest_does_not_depend_on_the_order_of_keys() {
@@ -137,7 +200,7 @@ mod tests {
     fn another_recipe_is_refused_and_the_setting_named() {
         let recipe = json!({"clusters": 256, "seed": 1});
         let attributes = json!({"recipe": {"clusters": 64, "seed": 1}, "digest": digest(&json!({"clusters": 64, "seed": 1}))});
-        let error = expect_same(Path::new("m"), attributes.as_object().unwrap(), &recipe).unwrap_err();
+        let error = Made::of(attributes.as_object().unwrap()).expect(Path::new("m"), &recipe).unwrap_err();
         assert!(error.to_string().contains("clusters was 64, now 256"), "{error}");
     }
 

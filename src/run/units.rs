@@ -80,7 +80,7 @@ pub fn for_each<U: Sync, T: Send>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::{Error, Kind};
+    use crate::error::{Error, ErrorKind};
     use crate::run::budget;
     use crate::run::progress::Silent;
     use std::sync::atomic::AtomicBool;
@@ -110,10 +110,10 @@ mod tests {
             if unit == 3 { Err(Error::input("unit 3")) } else { Ok(()) }
         };
         let error = for_each(&context(&stop), &units, 1, failing).unwrap_err();
-        assert_eq!((error.kind(), done.into_inner()), (Kind::Input, 4));
+        assert_eq!((error.kind(), done.into_inner()), (ErrorKind::Input, 4));
         stop.store(true, Ordering::Relaxed);
         let error = for_each(&context(&stop), &units, 2, |_| Ok(())).unwrap_err();
-        assert_eq!(error.kind(), Kind::Stopped);
+        assert_eq!(error.kind(), ErrorKind::Stopped);
     }
 
     #[test]
@@ -121,6 +121,6 @@ mod tests {
         let stop = AtomicBool::new(false);
         let in_flight = |bytes| in_flight(&context(&stop), "a unit", bytes);
         assert_eq!([10, 30, 60, 100].map(|bytes| in_flight(bytes).unwrap()), [4, 3, 1, 1]);
-        assert_eq!(in_flight(101).unwrap_err().kind(), Kind::Usage);
+        assert_eq!(in_flight(101).unwrap_err().kind(), ErrorKind::Usage);
     }
 }

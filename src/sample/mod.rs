@@ -23,7 +23,7 @@ pub use surface::{MOST_SIDE, Surface};
 
 /// The materials that can be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum MaterialKind {
     /// Lacquered, ring-porous wood with the grain along x.
     Wood,
     /// Grained leather: cells, grooves, creases and pores.
@@ -61,7 +61,7 @@ trait Material: Sync {
     fn matter(&self, x: f64, y: f64) -> Matter;
 }
 
-impl Kind {
+impl MaterialKind {
     /// Bound on |height| in units of the material; heights are held within it.
     fn relief(self) -> f64 {
         match self {

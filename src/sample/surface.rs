@@ -7,7 +7,7 @@ use super::HORIZON;
 use super::leather::Leather;
 use super::noise::DOMAIN;
 use super::wood::Wood;
-use super::{Kind, Material, Matter};
+use super::{Material, MaterialKind, Matter};
 use crate::error::{Error, Result};
 use crate::random::Hash;
 
@@ -48,7 +48,7 @@ impl Texel {
 /// A surface with its truth. Lengths in texels, heights over the mean plane.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    kind: Kind,
+    kind: MaterialKind,
     seed: u64,
     width: usize,
     height: usize,
@@ -78,7 +78,7 @@ impl Surface {
     ///
     /// # Errors
     /// A size that is zero or above 65536, or a scale out of its range.
-    pub fn new(kind: Kind, width: usize, height: usize, scale: f64, seed: u64) -> Result<Self> {
+    pub fn new(kind: MaterialKind, width: usize, height: usize, scale: f64, seed: u64) -> Result<Self> {
         if !(1..=MOST_SIDE).contains(&width) || !(1..=MOST_SIDE).contains(&height) {
             return Err(Error::usage(format!(
                 "a surface of {width}x{height} texels; each side may be 1 to {MOST_SIDE}"
@@ -91,8 +91,8 @@ impl Surface {
         let (from, to) =
             (lattice.place(0, 0), lattice.place(width + 2 * lattice.margin, height + 2 * lattice.margin));
         let material: Box<dyn Material> = match kind {
-            Kind::Wood => Box::new(Wood::new(seed)),
-            Kind::Leather => Box::new(Leather::new(seed, from, to)),
+            MaterialKind::Wood => Box::new(Wood::new(seed)),
+            MaterialKind::Leather => Box::new(Leather::new(seed, from, to)),
         };
         Ok(Self::sampled(material.as_ref(), kind, [width, height], scale, seed))
     }
@@ -100,7 +100,7 @@ impl Surface {
     /// A material sampled at the texels; `kind` bounds its heights.
     pub(super) fn sampled(
         material: &dyn Material,
-        kind: Kind,
+        kind: MaterialKind,
         [width, height]: [usize; 2],
         scale: f64,
         seed: u64,
@@ -134,7 +134,7 @@ impl Surface {
     }
 
     /// The material.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> MaterialKind {
         self.kind
     }
 
@@ -193,7 +193,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    pub(super) fn new(kind: Kind, scale: f64, seed: u64) -> Self {
+    pub(super) fn new(kind: MaterialKind, scale: f64, seed: u64) -> Self {
         // Every seed begins elsewhere, so that none shows a special place.
         let [x, y, ..] = Hash::new(seed, DOMAIN + 0xFE).uniforms(0, 0, 0);
         // A view ray strays by the relief on its way; from there a shadow ray goes through twice

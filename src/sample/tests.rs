@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::*;
 
-const KINDS: [Kind; 2] = [Kind::Wood, Kind::Leather];
+const KINDS: [MaterialKind; 2] = [MaterialKind::Wood, MaterialKind::Leather];
 const SIZE: usize = 40;
 
 /// Dull grey of a height given by a function of column and row, texels; `bright` where albedo is 0.6.
@@ -41,9 +41,9 @@ fn picture(
     light: [f64; 2],
     view: [f64; 2],
 ) -> Vec<f64> {
-    let origin = surface::Lattice::new(Kind::Leather, 1.0, 1).origin;
+    let origin = surface::Lattice::new(MaterialKind::Leather, 1.0, 1).origin;
     let shape = Shape { height, bright, origin };
-    let surface = Surface::sampled(&shape, Kind::Leather, [SIZE, SIZE], 1.0, 1);
+    let surface = Surface::sampled(&shape, MaterialKind::Leather, [SIZE, SIZE], 1.0, 1);
     let scene = Scene::new(surface, &[light]);
     let bytes = scene.view(0, view).image(0).unwrap();
     bytes.chunks(3).map(|rgb| f64::from(rgb[1])).collect()
@@ -232,10 +232,10 @@ fn pictures_are_well_exposed() {
 
 #[test]
 fn requests_that_cannot_be_met_are_refused() {
-    let made = |width, height, scale| Surface::new(Kind::Wood, width, height, scale, 0).is_ok();
+    let made = |width, height, scale| Surface::new(MaterialKind::Wood, width, height, scale, 0).is_ok();
     assert!(made(1, 1, 0.25));
     assert!(!made(0, 8, 1.0) && !made(8, 0, 1.0) && !made(8, 70_000, 1.0));
     assert!(!made(8, 8, 0.0) && !made(8, 8, f64::NAN) && !made(8, 8, 9.0));
-    let scene = Scene::new(Surface::new(Kind::Wood, 4, 4, 1.0, 0).unwrap(), &[[0.0, 0.0]]);
+    let scene = Scene::new(Surface::new(MaterialKind::Wood, 4, 4, 1.0, 0).unwrap(), &[[0.0, 0.0]]);
     assert!(scene.view(0, [0.5, 0.0]).image(1).is_none());
 }

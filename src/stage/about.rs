@@ -15,6 +15,7 @@ use crate::store::enlarged::{self, Enlarged, Method};
 use crate::store::measurement::{self, Description, Measurement};
 use crate::store::model::appearance::AppearanceReport;
 use crate::store::model::field::FieldReport;
+use crate::store::model::tile::TileRecipe;
 use crate::store::model::tile::TileReport;
 use crate::store::model::{self, Model, Stage};
 use crate::zarr::Store;
@@ -242,20 +243,15 @@ pub fn store(path: &Path) -> Result<About> {
         }
         _ => {
             let measurement = Measurement::open(path)?;
-            Ok(About::Measurement(Box::new(of_measurement(&measurement, &attributes, kept))))
+            Ok(About::Measurement(Box::new(of_measurement(&measurement, kept))))
         }
     }
 }
 
-fn of_measurement(
-    measurement: &Measurement,
-    attributes: &Map<String, Value>,
-    kept: impl Fn(u64, bool) -> Kept,
-) -> Measured {
+fn of_measurement(measurement: &Measurement, kept: impl Fn(u64, bool) -> Kept) -> Measured {
     let description = measurement.description();
     let views_done = measurement.views_done();
-    let assumptions = attributes.get("assumptions").and_then(Value::as_array).into_iter().flatten();
-    let archive = attributes.get("recipe").and_then(|recipe| recipe.get("format")?.as_str());
+    let recipe = measurement.recipe();
     Measured {
         kept: kept(measurement.format(), views_done == description.views.len()),
         samples: Samples::of(description),
@@ -263,26 +259,26 @@ fn of_measurement(
         codec: measurement.codec().name(),
         views_done,
         digest: measurement.digest().to_owned(),
-        archive: archive.map(str::to_owned),
-        assumptions: assumptions.filter_map(|text| text.as_str().map(str::to_owned)).collect(),
+        archive: Some(recipe.format.clone()).filter(|format| !format.is_empty()),
+        assumptions: recipe.assumptions.clone(),
     }
 }
 
 fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled> {
     let mut stages = Vec::new();
     for stage in Stage::ALL {
-        let entry = model.stage(stage)?;
-        let done = entry.is_some() && model.has_arrays(stage)?;
-        let recipe = entry.and_then(|mut entry| entry.remove("recipe"));
+        let recipe = model.recipe_text(stage)?;
+        let done = recipe.is_some() && model.has_arrays(stage)?;
         stages.push(Done { stage: stage.name(), done, recipe });
     }
     let is_there =
         |stage: Stage| stages.iter().any(|done| done.stage == stage.name() && done.recipe.is_some());
-    let recipe = stages.first().and_then(|tile| tile.recipe.as_ref());
-    let measurement = recipe.and_then(|recipe| recipe.get("measurement")?.as_str());
     Ok(Modelled {
         kept: kept(model.format(), stages.iter().all(|done| done.done)),
-        measurement: measurement.map(str::to_owned),
+        measurement: is_there(Stage::Tile)
+            .then(|| model.recipe::<TileRecipe>(Stage::Tile))
+            .transpose()?
+            .map(|recipe| recipe.measurement),
         tile: is_there(Stage::Tile).then(|| model.tile_report()).transpose()?,
         cluster: is_there(Stage::Cluster).then(|| model.report(Stage::Cluster)).transpose()?,
         normals: is_there(Stage::Normals).then(|| model.report(Stage::Normals)).transpose()?,

@@ -12,8 +12,9 @@ use crate::method::coherent::{FEATURES, MOST_SIDE};
 use crate::method::tile::Tile;
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::shape::{Size, Window};
+use crate::store::model::appearance::AppearanceRecipe;
 use crate::store::model::appearance::AppearanceReport;
 use crate::store::model::{Model, Stage};
 
@@ -53,9 +54,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         )));
     }
     let lattice = options.lattice;
-    let recipe = json!({
-        "stage": "appearance", "method": METHOD, "cluster": cluster, "lattice": lattice.to_string(),
-    });
+    let recipe = AppearanceRecipe { cluster, lattice: lattice.to_string() }.to_value()?;
     Ok(Plan { model, tile, lattice, recipe })
 }
 

@@ -1,4 +1,4 @@
-//! Model against measurement: how well the tile is re-made from its index and representatives.
+//! Model against measurement: how well the tile is reconstructed from its index and representatives.
 
 use std::path::PathBuf;
 
@@ -10,6 +10,7 @@ use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::image::of_stage;
+use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 
 /// Texels whose colour differences are taken; the other figures count every texel.
@@ -30,7 +31,7 @@ pub struct Options {
     pub measurement: PathBuf,
 }
 
-/// Errors of the re-made tile.
+/// Errors of the reconstructed tile.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// One entry an elevation of the view, frontal first.
@@ -58,13 +59,14 @@ pub struct Errors {
     pub samples_left_out: u64,
     /// Mean CIEDE2000.
     pub ciede2000: f64,
-    /// The CIEDE2000 that 95 % of the texels' samples stay below or at, to 0.05; the last step stands for all above 100.
+    /// The CIEDE2000 that 95 % of the texels' samples stay below or at, to 0.05; the last step stands for all above
+    /// 100.
     pub ciede2000_95: f64,
 }
 
 impl Errors {
-    /// Whether colours differ by much more than their lightness: texels of one lightness and several hues share clusters,
-    /// which are formed by lightness alone.
+    /// Whether colours differ by much more than their lightness: texels of one lightness and several hues share
+    /// clusters, which are formed by lightness alone.
     pub fn hues_are_lost(&self) -> bool {
         /// A colour difference that is seen beside each other by everybody.
         const SEEN: f64 = 3.0;
@@ -165,13 +167,24 @@ impl Sums {
     }
 }
 
-/// Re-makes the tile under every pair of directions and compares it with the measurement.
-pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
+/// Opens what is compared.
+///
+/// # Errors
+/// Where the model is not of this measurement.
+pub fn open(options: &Options) -> Result<(Model, Measurement)> {
     let model = Model::open(&options.model)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
+    Ok((model, measurement))
+}
+
+/// Re-makes the tile under every pair of directions and compares it with the measurement.
+///
+/// # Errors
+/// Those of reading, and too little memory.
+pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> Result<Report> {
     let description = measurement.description();
-    let (tile, index) = (model.tile()?, of_stage(&model, Stage::Cluster, Model::index)?);
-    let representatives = of_stage(&model, Stage::Cluster, Model::representatives)?;
+    let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
+    let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
     let (texel, channels) = (description.texel_samples(), description.n_channels());
     let decoder = description.decoder()?;

@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{Direction, Samples};
+use btfkit_formats::Samples;
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::archive::Source;
 use crate::color::{Remarkable, Transfer};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::run::units::each_at_once;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
 use crate::store::measurement::gather::Images;
-use crate::store::measurement::{Description, Measurement, Origin};
+use crate::store::measurement::{Description, ImportRecipe, Measurement};
 use crate::words::counted;
 use crate::zarr::codec::Chain;
 
@@ -75,7 +75,7 @@ pub struct Plan<'a> {
     source: &'a dyn Source,
     options: Options,
     description: Description,
-    recipe: Value,
+    recipe: ImportRecipe,
 }
 
 /// How an import went.
@@ -107,26 +107,15 @@ pub fn describe(source: &dyn Source, white: f64) -> Description {
 pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>) -> Result<Plan<'a>> {
     let description = describe(source, options.white);
     description.decoder()?;
-    let degrees = |list: &[Direction]| -> Vec<[f64; 2]> {
-        list.iter().map(|d| d.degrees()).map(|(theta, phi)| [theta, phi]).collect()
-    };
     let contents = source.contents();
-    let recipe = json!({
-        "stage": "import",
-        "method": METHOD,
-        "format": contents.format,
-        "size": [description.size.height, description.size.width],
-        "channels": description.channels,
-        "samples": description.sample_type.name(),
-        "views": degrees(&description.views),
-        "lights": degrees(&description.lights),
-        "images": source.check(context)?,
-        "reading": source.reading(),
-        "transfer": description.transfer,
-        "white": options.white,
-        "codec": options.codec.name(),
-        "assumptions": contents.assumptions,
-    });
+    let recipe = ImportRecipe {
+        format: contents.format.clone(),
+        images: source.check(context)?,
+        reading: serde_json::to_value(source.reading())
+            .map_err(|error| Error::internal(error.to_string()))?,
+        assumptions: contents.assumptions.clone(),
+        ..ImportRecipe::of(&description, options.codec)
+    };
     Ok(Plan { source, options, description, recipe })
 }
 
@@ -145,7 +134,7 @@ impl Plan<'_> {
             "unit": "view",
             "units": self.views().count(),
             "unit_memory_bytes": self.unit_bytes(),
-            "recipe": self.recipe,
+            "recipe": self.recipe.to_value().unwrap_or_default(),
         })
     }
 
@@ -179,12 +168,14 @@ impl Plan<'_> {
             counted(self.description.lights.len(), "light")
         );
         context.require(&unit, self.unit_bytes())?;
-        let contents = self.source.contents();
-        let origin =
-            Origin { recipe: &self.recipe, assumptions: &contents.assumptions, remarks: &contents.remarks };
-        let store = &self.options.store;
-        let measurement =
-            Measurement::create(store, self.description.clone(), self.options.codec, &origin, context)?;
+        let measurement = Measurement::create(
+            &self.options.store,
+            self.description.clone(),
+            self.options.codec,
+            self.recipe.clone(),
+            &self.source.contents().remarks,
+            context,
+        )?;
         let (found, missing): (Vec<usize>, Vec<usize>) =
             self.views().partition(|&view| measurement.has_view(view));
         context.progress.begin("import", self.images(), Counted::Items("images"));
@@ -198,7 +189,7 @@ impl Plan<'_> {
         // One view is written while the next is decoded; the threads share the work of each.
         let read = |&view: &usize| match read_view(self.source, view, self.options.white, context) {
             // A broken image does not keep the others from being looked at: all are named at the end.
-            Err(error) if error.kind() == Kind::Input => Ok((view, Err(error.to_string()))),
+            Err(error) if error.kind() == ErrorKind::Input => Ok((view, Err(error.to_string()))),
             images => Ok((view, Ok(images?))),
         };
         read_ahead::for_each(context, in_flight, &missing, read, |(view, images)| {
@@ -216,7 +207,7 @@ impl Plan<'_> {
         })?;
         context.progress.end();
         if !problems.is_empty() {
-            return Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines()))
+            return Err(Error::list(ErrorKind::Input, problems.iter().flat_map(|problem| problem.lines()))
                 .hint("replace these images and import again: if they have changed, with --force"));
         }
         measurement.finish(context)?;
@@ -259,14 +250,14 @@ pub(crate) fn read_view(
                     *before.get_or_insert_default() += found;
                 }
             }
-            Err(error) if error.kind() == Kind::Input => problems.push(error.to_string()),
+            Err(error) if error.kind() == ErrorKind::Input => problems.push(error.to_string()),
             Err(error) => return Err(error),
         }
     }
     if problems.is_empty() {
         Ok((images, before))
     } else {
-        Err(Error::list(Kind::Input, problems.iter().flat_map(|problem| problem.lines())))
+        Err(Error::list(ErrorKind::Input, problems.iter().flat_map(|problem| problem.lines())))
     }
 }
 

@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use btfkit_formats::Samples;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::Result;
 use crate::method::stereo::Stereo;
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::run::{Context, read_ahead};
 use crate::shape::{Size, Window};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::measurement::Measurement;
+use crate::store::model::normals::NormalsRecipe;
+pub use crate::store::model::normals::NormalsReport as Report;
 use crate::store::model::{Model, Stage};
 
 /// Rows of the measurement read at a time: a row of chunks.
@@ -31,19 +32,6 @@ pub struct Options {
     pub robust: bool,
 }
 
-/// How it went.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Report {
-    /// Number of the view that was used.
-    pub view: usize,
-    /// Number of lights.
-    pub lights: usize,
-    /// Mean of the normals.
-    pub mean: [f64; 3],
-    /// Root mean square angle between a normal and the mean normal, degrees.
-    pub spread_deg: f64,
-}
-
 /// An estimation, ready to run.
 pub struct Plan {
     measurement: Measurement,
@@ -57,7 +45,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
     let tile = model.stage_digest(Stage::Tile)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
-    let recipe = json!({"stage": "normals", "method": METHOD, "tile": tile, "robust": options.robust});
+    let recipe = NormalsRecipe { tile, robust: options.robust }.to_value()?;
     Ok(Plan { measurement, model, robust: options.robust, recipe })
 }
 

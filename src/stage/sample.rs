@@ -11,7 +11,7 @@ use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::sample::{Kind, Scene, Surface};
+use crate::sample::{MaterialKind, Scene, Surface};
 use crate::shape::Size;
 use crate::words::counted;
 
@@ -24,7 +24,7 @@ pub struct Options {
     /// The zip to write.
     pub archive: PathBuf,
     /// Which material.
-    pub kind: Kind,
+    pub kind: MaterialKind,
     /// Rows and columns of its images.
     pub size: Size,
     /// Number of view directions; 81 are UBO2003's.
@@ -42,7 +42,7 @@ impl Options {
     pub fn new(archive: impl Into<PathBuf>) -> Self {
         Self {
             archive: archive.into(),
-            kind: Kind::Leather,
+            kind: MaterialKind::Leather,
             size: Size::new(128, 128),
             views: 81,
             lights: 81,
@@ -94,7 +94,7 @@ pub fn directions(count: usize) -> Result<Vec<Angles>> {
 /// Renders the material and writes the archive; it appears whole or not at all.
 ///
 /// # Errors
-/// [`crate::Kind::Recipe`] where another file is.
+/// [`crate::ErrorKind::Recipe`] where another file is.
 pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
     let (views, lights) = (directions(options.views)?, directions(options.lights)?);
     let radians = |angles: &Angles| [angles.theta_deg().to_radians(), angles.phi_deg().to_radians()];

@@ -57,7 +57,7 @@ pub struct History {
     /// How many of the first blocks the pass goes over, where it is a mini-batch; all where there is none.
     #[serde(default)]
     pub batch: Option<usize>,
-    /// Texels of the first approach.
+    /// Texels of the initial clustering.
     pub sample_texels: usize,
     /// Passes over these.
     pub sample_passes: Vec<Pass>,
@@ -143,7 +143,7 @@ impl Passes {
     /// Begins the passes of a recipe at `path`, or goes on with them.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's lie there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's lie there.
     pub fn create(path: &Path, recipe: &Value, context: &Context<'_>) -> Result<Self> {
         let mut store = Store::at(path);
         let lock = store.begin_by_recipe(KIND, recipe, json!({}), context)?;

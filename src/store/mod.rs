@@ -17,8 +17,45 @@ use serde_json::{Map, Value, json};
 use crate::disk::lock::Lock;
 use crate::disk::temporary::{Temporary, remove_folder};
 use crate::error::{Error, Result};
-use crate::run::{Context, Existing, recipe};
+use crate::run::recipe::{self, Made};
+use crate::run::{Context, Existing};
 use crate::zarr::{FORMAT, Store, metadata};
+
+/// Whether a file of a store that a recipe makes is one that this program writes, by its way from the root.
+fn is_own(path: &Path) -> bool {
+    const ARRAYS: [&str; 14] = [
+        "reflectance",
+        "luminance",
+        "view_direction",
+        "view_theta",
+        "view_phi",
+        "light_direction",
+        "light_theta",
+        "light_phi",
+        "index",
+        "source",
+        "normals",
+        // Of the state of a clustering, in groups `pass_0000` and `part_00000`.
+        "centres",
+        "texels",
+        "counts",
+    ];
+    let is_number =
+        |text: &str| !text.is_empty() && text.len() < 20 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_group =
+        |name: &&str| ["pass_", "part_"].iter().any(|begin| name.strip_prefix(begin).is_some_and(is_number));
+    let Some(parts) = path.iter().map(|part| part.to_str()).collect::<Option<Vec<&str>>>() else {
+        return false;
+    };
+    let mut parts = parts.into_iter().skip_while(is_group).peekable();
+    let in_array = parts.next_if(|name| ARRAYS.contains(name)).is_some();
+    match (in_array, parts.next()) {
+        (_, Some(metadata::FILE)) => parts.next().is_none(),
+        (true, Some("c")) => parts.peek().is_some() && parts.all(is_number),
+        (false, Some(enlarged::state::NAME | origin::MODEL | origin::MEASUREMENT)) => parts.next().is_none(),
+        _ => false,
+    }
+}
 
 /// Name of the lock that whoever writes a store by a recipe shares with others who do.
 const WRITING: &str = "-writing";
@@ -32,7 +69,9 @@ impl Store {
         let mut store = Self::at(path);
         let attributes = store.expect(kind)?;
         store.format = attributes.get("format").and_then(Value::as_u64).unwrap_or(FORMAT);
-        store.opened = attributes.get("digest").and_then(Value::as_str).map(str::to_owned);
+        if let Some(digest) = attributes.get("digest").and_then(Value::as_str) {
+            store.see("", digest);
+        }
         Ok((store, attributes))
     }
 
@@ -75,7 +114,7 @@ impl Store {
     /// Returns a lock that keeps others from removing this one; it is to be held while the store is written.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's store lies there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's store lies there.
     pub fn begin_by_recipe(
         &mut self,
         kind: &str,
@@ -94,10 +133,10 @@ impl Store {
             attributes.extend(more);
         }
         let found = self.begin(kind, attributes, context)?;
-        recipe::expect_same(self.path(), &found, recipe)?;
+        Made::of(&found).expect(self.path(), recipe)?;
         let lock = Lock::share(self.path(), WRITING, context)?;
         // It may have been removed between.
-        recipe::expect_same(self.path(), &self.expect(kind)?, recipe)?;
+        Made::of(&self.expect(kind)?).expect(self.path(), recipe)?;
         self.sweep()?;
         Ok(lock)
     }
@@ -107,7 +146,7 @@ impl Store {
         let is_another = || -> Result<bool> {
             match self.attributes() {
                 Ok(None) => Ok(false),
-                Ok(Some(_)) => Ok(recipe::expect_same(self.path(), &self.expect(kind)?, recipe).is_err()),
+                Ok(Some(_)) => Ok(Made::of(&self.expect(kind)?).expect(self.path(), recipe).is_err()),
                 Err(_) if self.claimed_kind().as_deref() == Some(kind) => Ok(true),
                 Err(error) => Err(error),
             }
@@ -119,13 +158,22 @@ impl Store {
         if !is_another()? {
             return Ok(());
         }
-        remove_folder(self.path(), |path| {
-            let is = |name: &str| path.file_name().is_some_and(|file| file == name);
-            // Chunks lie in a folder `c` of their array.
-            is(metadata::FILE)
-                || path.components().any(|part| part.as_os_str() == "c")
-                || [enlarged::state::NAME, origin::MODEL, origin::MEASUREMENT].into_iter().any(is)
-        })
+        // Moved away with the rest, what others noted beside our attributes would be missed.
+        let others: Vec<String> =
+            self.root().ok().flatten().unwrap_or_default().into_iter().map(|(name, _)| name).collect();
+        let others: Vec<&str> = others
+            .iter()
+            .map(String::as_str)
+            .filter(|name| !["btfkit", "coordinates"].contains(name))
+            .collect();
+        if !others.is_empty() {
+            context.progress.notice(&format!(
+                "{} is made anew without the attributes that were added to it: {}",
+                self.path().display(),
+                others.join(", ")
+            ));
+        }
+        remove_folder(self.path(), is_own)
     }
 
     /// The kind that a root names, however damaged its other attributes are.
@@ -136,6 +184,8 @@ impl Store {
     }
 
     fn expect_ours_or_nothing(&self) -> Result<()> {
+        // A link that leads nowhere is no free name.
+        recognise::expect_readable(self.path())?;
         let occupied = match self.attributes()? {
             Some(_) => false,
             None => self.metadata_path("").exists() || recognise::other(self.path())?.is_some(),
@@ -150,8 +200,8 @@ impl Store {
     /// The attributes of a store that must exist and be of this kind.
     ///
     /// # Errors
-    /// [`crate::Kind::Missing`] where there is nothing; [`crate::Kind::Input`] where there is something else, or a store
-    /// whose attributes were changed: says what it is, and what to do.
+    /// [`crate::ErrorKind::Missing`] where there is nothing; [`crate::ErrorKind::Input`] where there is something else,
+    /// or a store whose attributes were changed: says what it is, and what to do.
     pub fn expect(&self, kind: &str) -> Result<Map<String, Value>> {
         self.expect_one_of(&[kind])
     }

@@ -51,7 +51,7 @@ enum Use {
 /// Checks that a path is no link that leads nowhere, and no pipe, socket or device: nothing can be there to be read.
 ///
 /// # Errors
-/// [`crate::Kind::Missing`], with what it is, or leads to.
+/// [`crate::ErrorKind::Missing`], with what it is, or leads to.
 pub fn expect_readable(path: &Path) -> Result<()> {
     // With a slash behind it, a link would be followed.
     let path: std::path::PathBuf = path.components().collect();

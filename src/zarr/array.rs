@@ -22,7 +22,7 @@ use super::metadata::{self, may_be_ignored, read_object, shown};
 use super::storage::MappedStorage;
 use super::{Store, ZSTD_LEVEL};
 use crate::disk::temporary;
-use crate::error::{Error, Kind, Result, advice};
+use crate::error::{Error, ErrorKind, Result, advice};
 
 /// Most bytes of a chunk that is not in a shard.
 const CHUNK_LIMIT_BYTES: u64 = 16 << 20;
@@ -205,15 +205,18 @@ impl Store {
     /// What an array's `zarr.json` holds.
     ///
     /// # Errors
-    /// [`Kind::Missing`] where there is none.
+    /// [`ErrorKind::Missing`] where there is none.
     pub(crate) fn array_document(&self, name: &str) -> Result<Map<String, Value>> {
         let file = self.metadata_path(name);
-        read_object(&file)
-            .map_err(|error| if error.kind() == Kind::Io { error } else { error.hint(REMADE) })?
-            .ok_or_else(|| {
-                Error::missing(format!("{}: no array {name} in this store", self.path().display()))
-                    .hint("run the command that makes this store again; it goes on where it stopped")
-            })
+        let document = read_object(&file)
+            .map_err(|error| if error.kind() == ErrorKind::Io { error } else { error.hint(MAKE_AGAIN) })
+            .and_then(|document| {
+                document.ok_or_else(|| {
+                    Error::missing(format!("{}: no array {name} in this store", self.path().display()))
+                        .hint("run the command that makes this store again; it goes on where it stopped")
+                })
+            });
+        self.unless_made_anew(document)
     }
 
     /// The shape that an array claims, of so many dimensions; nothing else of it is checked.
@@ -233,10 +236,10 @@ impl Store {
     /// Opens an array for reading.
     ///
     /// # Errors
-    /// [`Kind::Missing`] where there is none, [`Kind::Input`] where its metadata are not those of the layout.
+    /// [`ErrorKind::Missing`] where there is none, [`ErrorKind::Input`] where its metadata are not those of the layout.
     pub fn open_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
-        let document = self.array_document(name)?;
-        self.check_document(name, layout, &document)
+        let document = self.array_document(name);
+        self.unless_made_anew(document.and_then(|document| self.check_document(name, layout, &document)))
     }
 
     /// Checks a document against the layout of an array.
@@ -257,7 +260,7 @@ impl Store {
     }
 
     fn unlike(&self, name: &str, what: &str) -> Error {
-        Error::input(format!("{}: {what}", self.metadata_path(name).display())).hint(REMADE)
+        Error::input(format!("{}: {what}", self.metadata_path(name).display())).hint(MAKE_AGAIN)
     }
 
     /// Writes a whole array of chunks without shards.
@@ -299,7 +302,7 @@ impl Store {
 }
 
 /// What to do about metadata that are not those that were written.
-const REMADE: &str = "run the command that makes this store again: it writes this file anew";
+const MAKE_AGAIN: &str = "run the command that makes this store again: it writes this file anew";
 
 /// The first difference of a document from what it must be. Attributes beside the expected ones are free; names of
 /// dimensions count where `strict` is given.
@@ -355,7 +358,7 @@ fn write_error(error: &zarrs::array::ArrayError) -> Error {
         ) => Some(refused),
         _ => None,
     };
-    let failed = Error::new(Kind::Io, error.to_string());
+    let failed = Error::new(ErrorKind::Io, error.to_string());
     match refused.and_then(|refused| advice(refused, false)) {
         Some(advice) => failed.hint(advice),
         None => failed,
@@ -439,7 +442,7 @@ mod tests {
     fn what_the_system_refuses_keeps_its_advice_through_zarrs() {
         let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
         let error = write_error(&StorageError::IOError(Arc::new(full)).into());
-        assert_eq!(error.kind(), Kind::Io);
+        assert_eq!(error.kind(), ErrorKind::Io);
         assert!(error.guidance().unwrap().contains("space"), "{error}");
     }
 }

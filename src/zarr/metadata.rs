@@ -31,7 +31,8 @@ const SHOWN: usize = 120;
 /// The bytes of a file of metadata; `None` where there is none.
 ///
 /// # Errors
-/// [`crate::Kind::Input`] for what is no file, or one of more than 16 MiB; [`crate::Kind::Io`] where it cannot be read.
+/// [`crate::ErrorKind::Input`] for what is no file, or one of more than 16 MiB; [`crate::ErrorKind::Io`] where it
+/// cannot be read.
 pub(crate) fn read_file(path: &Path) -> Result<Option<Vec<u8>>> {
     let failed = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::InvalidInput => Error::input(format!("{}: {error}", path.display())),

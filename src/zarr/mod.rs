@@ -11,6 +11,7 @@ mod read;
 pub(crate) mod shard;
 pub mod storage;
 
+use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -59,8 +60,8 @@ pub struct Store {
     pub(crate) format: u64,
     /// Our attributes of the root as they were read last, and of which file: they are asked for at every array.
     known: Arc<Mutex<Option<Known>>>,
-    /// Digest of the recipe of a store that was opened to be read.
-    pub(crate) opened: Option<String>,
+    /// Digests of the recipes of what has been read of it, by the name of the stage; "" is the store itself.
+    seen: Arc<Mutex<BTreeMap<String, String>>>,
 }
 
 /// Attributes of a file as they were read.
@@ -91,7 +92,7 @@ impl Store {
             storage: Arc::new(MappedStorage::new(path)),
             format: FORMAT,
             known: Arc::default(),
-            opened: None,
+            seen: Arc::default(),
         }
     }
 
@@ -147,14 +148,35 @@ impl Store {
         Ok(Some(result))
     }
 
-    /// Refuses a store that was made anew by another recipe since it was opened to be read: what was read of it would be
-    /// mixed. To be asked when a file of it has been opened; one that is removed or replaced later stays as it was.
+    /// Takes note of what is read: of a stage ("" for the store itself) that was made by the recipe of this digest.
+    pub(crate) fn see(&self, stage: &str, digest: &str) {
+        let mut seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        seen.entry(stage.to_owned()).or_insert_with(|| digest.to_owned());
+    }
+
+    /// Forgets a stage that this process itself makes anew.
+    pub(crate) fn forget(&self, stage: &str) {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).remove(stage);
+    }
+
+    /// Refuses a store of which something was made anew by another recipe since it was first [seen](Self::see): what was
+    /// read of it would be mixed. To be asked when a file of it has been opened; one that is removed or replaced later
+    /// stays as it was.
     ///
     /// # Errors
-    /// [`crate::Kind::Input`], and those of reading the attributes.
+    /// [`crate::ErrorKind::Input`], and those of reading the attributes.
     pub(crate) fn expect_unchanged(&self) -> Result<()> {
-        let Some(opened) = &self.opened else { return Ok(()) };
-        let same = |ours: &Map<String, Value>| ours.get("digest").and_then(Value::as_str) == Some(opened);
+        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if seen.is_empty() {
+            return Ok(());
+        }
+        let same = |ours: &Map<String, Value>| {
+            seen.iter().all(|(stage, digest)| {
+                let of_stage = || ours.get("stages")?.get(stage)?.get("digest");
+                let found = if stage.is_empty() { ours.get("digest") } else { of_stage() };
+                found.and_then(Value::as_str) == Some(digest)
+            })
+        };
         if self.with_attributes(same)? == Some(true) {
             return Ok(());
         }
@@ -162,8 +184,16 @@ impl Store {
             .hint("run the same command again"))
     }
 
+    /// A result of reading; where that failed since the store was made anew, this is said instead.
+    pub(crate) fn unless_made_anew<T>(&self, result: Result<T>) -> Result<T> {
+        match result {
+            Ok(found) => Ok(found),
+            Err(error) => self.expect_unchanged().and(Err(error)),
+        }
+    }
+
     /// All attributes of the root group; `None` where there is none.
-    fn root(&self) -> Result<Option<Map<String, Value>>> {
+    pub(crate) fn root(&self) -> Result<Option<Map<String, Value>>> {
         let Some(document) = metadata::read_object(&self.metadata_path(""))? else { return Ok(None) };
         if document.get("node_type") == Some(&json!("array")) {
             return Ok(Some(Map::new()));

@@ -45,7 +45,7 @@ impl Store {
     /// Maps the file of a chunk or a shard.
     ///
     /// # Errors
-    /// [`crate::Kind::Missing`] where it is not there, [`crate::Kind::Input`] where it is no file.
+    /// [`crate::ErrorKind::Missing`] where it is not there, [`crate::ErrorKind::Input`] where it is no file.
     pub(crate) fn map_chunk(path: &Path) -> Result<MappedFile> {
         MappedFile::open(path).map_err(|error| match error.kind() {
             _ if super::metadata::is_absent(&error) => {
@@ -62,8 +62,8 @@ impl Store {
     /// Reads a box of an array: offset and extent in each dimension.
     ///
     /// # Errors
-    /// [`crate::Kind::Missing`] where a part of it has not been written, [`crate::Kind::Input`] where one is damaged; both
-    /// name the file.
+    /// [`crate::ErrorKind::Missing`] where a part of it has not been written, [`crate::ErrorKind::Input`] where one is
+    /// damaged; both name the file.
     pub fn read_box<T: Named>(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<T>> {
         let refused =
             |what: String| Error::input(format!("{}: {}: {what}", self.path().display(), array.name));
@@ -134,9 +134,9 @@ impl Store {
             let corner = place.iter().zip(outer).map(|(&at, &side)| at * side).collect();
             Ok(Touched { corner, file: Self::map_chunk(&path)?, path })
         };
-        let files = places(&first, &end).map(touched).collect::<Result<_>>()?;
+        let files = places(&first, &end).map(touched).collect::<Result<_>>();
         self.expect_unchanged()?;
-        Ok(files)
+        files
     }
 
     /// Reads a whole array of this layout.
@@ -255,7 +255,7 @@ fn copy<T: Copy>(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
     use std::fs;
 
     #[test]
@@ -300,17 +300,17 @@ mod tests {
         };
         fs::write(&chunk, zstd::bulk::compress(&[1u8; 10], 3).unwrap()).unwrap();
         let (kind, text, _) = told();
-        assert_eq!(kind, Kind::Input);
+        assert_eq!(kind, ErrorKind::Input);
         assert!(text.contains("got a chunk of 10 bytes, expected 12"), "{text}");
         fs::remove_file(&chunk).unwrap();
-        let missing = |(kind, text, advice): (Kind, String, String)| {
-            assert_eq!(kind, Kind::Missing, "{text}");
+        let missing = |(kind, text, advice): (ErrorKind, String, String)| {
+            assert_eq!(kind, ErrorKind::Missing, "{text}");
             assert!(text.contains("has not been written") && advice.contains("goes on"), "{text}: {advice}");
         };
         missing(told());
         fs::create_dir(&chunk).unwrap();
         let (kind, text, advice) = told();
-        assert_eq!((kind, advice.as_str()), (Kind::Input, DAMAGED), "{text}");
+        assert_eq!((kind, advice.as_str()), (ErrorKind::Input, DAMAGED), "{text}");
         // A file where the folder of the chunks should be.
         fs::remove_dir_all(folder.path().join("a/c")).unwrap();
         fs::write(folder.path().join("a/c"), "").unwrap();

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use btfkit::store::measurement::Measurement;
+use btfkit::store::model::Model;
 
 use crate::fixture::{btf, fixture, succeed, tree};
 
@@ -224,6 +225,61 @@ fn a_store_that_is_made_anew_while_it_is_read_is_refused_and_never_mixed() {
             assert!(error.to_string().contains("was made anew while it was read"), "{codec}: {error}");
         }
         assert!(Measurement::open(&store).unwrap().read_reflectance(1, window).is_ok());
+    }
+}
+
+/// Whoever reads a model reads all of it, or is told; and what is made anew of it that he does not read is his gain.
+#[test]
+fn a_model_that_is_made_anew_while_it_is_read_is_refused_and_never_mixed() {
+    type Read = fn(&Model) -> btfkit::error::Result<()>;
+    let readers: [(&str, Read); 8] = [
+        ("tile", |model| model.tile().map(drop)),
+        ("triangles", |model| model.triangles().map(drop)),
+        ("index", |model| model.index().map(drop)),
+        ("representatives", |model| model.representatives().map(drop)),
+        ("clusters", |model| model.read_clusters().map(drop)),
+        ("normals", |model| model.normals().map(drop)),
+        ("surface", |model| model.surface().map(drop)),
+        ("appearance", |model| model.appearance().map(drop)),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let store = folder.path().join("m.model.zarr");
+    let make = |options: &[&str]| {
+        succeed(
+            crate::fixture::model_of(&fixture().measurement(), &store)
+                .args(["--levels", "1", "--force"])
+                .args(options),
+        )
+    };
+    make(&[]);
+    let opened: Vec<(&str, Read, Model)> =
+        readers.into_iter().map(|(name, read)| (name, read, Model::open(&store).unwrap())).collect();
+    opened
+        .iter()
+        .for_each(|(name, read, model)| read(model).unwrap_or_else(|error| panic!("{name}: {error}")));
+    // By the same recipe it is the same.
+    make(&[]);
+    opened.iter().for_each(|(_, read, model)| read(model).unwrap());
+    // Other clusters are none of the business of who reads normals.
+    make(&["--passes", "1"]);
+    let of_clusters = ["index", "representatives", "clusters", "appearance"];
+    let refused = |read: &Read, model: &Model, name: &str| {
+        let error = read(model).expect_err(name);
+        assert!(error.to_string().contains("was made anew while it was read"), "{name}: {error}");
+    };
+    for (name, read, model) in &opened {
+        match of_clusters.contains(name) {
+            true => refused(read, model, name),
+            false => read(model).unwrap(),
+        }
+    }
+    // Of another tile everything is another; also for who has opened it and read nothing yet.
+    let fresh = Model::open(&store).unwrap();
+    make(&["--seed", "2"]);
+    for (name, read, model) in &opened {
+        refused(read, model, name);
+        refused(read, &fresh, name);
+        read(&Model::open(&store).unwrap()).unwrap();
     }
 }
 

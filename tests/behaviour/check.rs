@@ -3,7 +3,7 @@
 use std::sync::atomic::AtomicBool;
 
 use btfkit::check::source::Views;
-use btfkit::check::{self, Place, Report, Severity, State};
+use btfkit::check::{self, ImageSelection, Report, Severity, State};
 use btfkit::color::{Transfer, srgb_decode, srgb_encode};
 use btfkit::run::Context;
 use btfkit::run::progress::Silent;
@@ -199,7 +199,7 @@ struct Case<'a> {
     source: Altered<'a>,
     code: &'static str,
     repair: Option<&'static str>,
-    places: Vec<Place>,
+    places: Vec<ImageSelection>,
 }
 
 /// All faults. The images named are of middling elevations.
@@ -216,7 +216,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
     let case = |name, source, code, repair, places| Case { name, source, code, repair, places };
     let good = || base.as_they_are();
     let here = move |v: usize, l: usize| (v, l) == (view, light);
-    let image = || vec![Place::image(view, light)];
+    let image = || vec![ImageSelection::image(view, light)];
     vec![
         case(
             "lights mirrored",
@@ -315,7 +315,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
             good().from(move |v, l| if here(v, l) { (other_view, other_light) } else { (v, l) }),
             "duplicate-image",
             None,
-            vec![Place::image(view, light), Place::image(other_view, other_light)],
+            vec![ImageSelection::image(view, light), ImageSelection::image(other_view, other_light)],
         ),
         case(
             "one image twice, once with noise",
@@ -336,7 +336,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
             ),
             "nearly-duplicate-image",
             None,
-            vec![Place::image(view, light), Place::image(other_view, other_light)],
+            vec![ImageSelection::image(view, light), ImageSelection::image(other_view, other_light)],
         ),
         case(
             "two images exchanged",
@@ -347,21 +347,21 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
             }),
             "images-exchanged",
             None,
-            vec![Place::image(view, light), Place::image(other_view, other_light)],
+            vec![ImageSelection::image(view, light), ImageSelection::image(other_view, other_light)],
         ),
         case(
             "exposure of one light",
             good().lit(move |_, l| if l == light { 1.5 } else { 1.0 }),
             "light-exposure",
             None,
-            vec![Place::light(light)],
+            vec![ImageSelection::light(light)],
         ),
         case(
             "exposure of one view",
             good().lit(move |v, _| if v == view { 1.0 / 1.5 } else { 1.0 }),
             "view-exposure",
             None,
-            vec![Place::view(view)],
+            vec![ImageSelection::view(view)],
         ),
         case(
             "exposure of one image",
@@ -380,7 +380,7 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
             }),
             "view-displaced",
             Some(""),
-            vec![Place::view(view)],
+            vec![ImageSelection::view(view)],
         ),
         case(
             "NaN",

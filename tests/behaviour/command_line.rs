@@ -8,7 +8,7 @@ use crate::fixture::{btf, copy, fail, fixture, succeed};
 /// Names of all commands, as the general help lists them in its groups.
 fn commands() -> Vec<String> {
     let help = succeed(btf().arg("--help"));
-    let groups = ["Convert:", "Check:", "Model:", "Enlarge:", "Look:", "Set up:"];
+    let groups = ["Try:", "Convert:", "Check:", "Model:", "Enlarge:", "Look:", "Set up:"];
     let places: Vec<usize> = groups.map(|group| help.find(&format!("\n{group}\n")).expect(group)).to_vec();
     assert!(places.is_sorted(), "{help}");
     let list = &help[places[0]..help.find("\nOptions:").unwrap()];

@@ -46,8 +46,8 @@ fn patch(store: &Path, array: &str, patches: &[(usize, &[u8])]) {
 /// Declares a stage done again, with the checksums that its arrays have now.
 fn declare(model: &Path, stage: Stage, context: &Context<'_>) -> Result<()> {
     let model = Model::open(model)?;
-    let entry = model.stage(stage)?.unwrap();
-    model.finish(stage, &entry["recipe"], &entry["report"], context)
+    let recipe = model.recipe_text(stage)?.unwrap();
+    model.finish(stage, &recipe, &model.report::<Value>(stage)?, context)
 }
 
 #[test]
@@ -181,12 +181,12 @@ fn what_no_enlargement_has_is_found_behind_right_checksums_and_seals() {
     let file = store.join("zarr.json");
     let whole = std::fs::read(&file).unwrap();
     for (member, value, words) in [
-        ("clusters", json!(0), "clusters: got Some(0)"),
-        ("clusters", json!(65537), "clusters: got Some(65537)"),
+        ("clusters", json!(0), "clusters: got 0"),
+        ("clusters", json!(65537), "clusters: got 65537"),
         ("clusters", json!(null), "clusters or tile: none"),
         ("tile", json!(null), "clusters or tile: none"),
         ("clusters", json!(8), "8 clusters, the model has"),
-        ("recipe/stage", json!("tile"), "got stage \"tile\""),
+        ("recipe/stage", json!("tile"), "stage: got \"tile\", expected"),
         ("recipe/size", json!([0, 40]), "got a side of 0"),
         ("recipe/size", json!([32, 1u64 << 40]), "got a side of 1099511627776"),
     ] {
@@ -319,6 +319,28 @@ fn change_and_seal(file: &Path, pointer: &str, value: Value) {
 }
 
 #[test]
+fn a_recipe_that_no_stage_has_is_found_behind_its_right_digest() {
+    for (stage, member, value, words) in [
+        (Stage::Tile, "measurement", json!(7), "recipe of tile: invalid type: integer `7`"),
+        (Stage::Cluster, "seeds", json!(1), "recipe of cluster: unknown field `seeds`"),
+        (Stage::Normals, "robust", json!("yes"), "recipe of normals: invalid type: string \"yes\""),
+        (Stage::Fit, "gains", json!("loud"), "recipe of fit: unknown variant `loud`"),
+        (Stage::Appearance, "stage", json!("fit"), "recipe of appearance: stage: got \"fit\""),
+    ] {
+        let copy = Copy::new();
+        let model = copy.place("m.zarr");
+        let told = with_context(|context| {
+            let opened = Model::open(&model).unwrap();
+            let mut recipe = opened.recipe_text(stage).unwrap().unwrap();
+            recipe[member] = value.clone();
+            opened.finish(stage, &recipe, &opened.report::<Value>(stage).unwrap(), context).unwrap();
+            told(&model, context)
+        });
+        assert!(told.contains(words), "{words}: {told}");
+    }
+}
+
+#[test]
 fn arrays_and_entries_of_another_model_are_found() {
     let copy = Copy::new();
     let model = copy.place("m.zarr");
@@ -336,7 +358,7 @@ fn arrays_and_entries_of_another_model_are_found() {
     found("cluster: no checksums");
     let entry = json!({"recipe": {}, "digest": "", "report": {}, "checksums": {}});
     change(&file, &format!("{stages}/more"), Some(entry));
-    found("no stage is called \"more\"");
+    found("unknown variant `more`");
     // Numbers that a model may have, but not this one.
     let half = 0.5f64.to_le_bytes();
     let patches: [(&str, &[u8]); 4] =

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-use btfkit::error::{Kind, Result};
+use btfkit::error::{ErrorKind, Result};
 use btfkit::picture::deepzoom::Encoding;
 use btfkit::run::progress::Silent;
 use btfkit::run::{Context, recipe};
@@ -96,7 +96,10 @@ fn is_whole(path: &Path, context: &Context<'_>) -> bool {
         }
         Ok(Found::Other(report)) => report.findings.is_empty(),
         Err(error) => {
-            assert!(matches!(error.kind(), Kind::Input | Kind::Missing | Kind::Recipe), "{error}");
+            assert!(
+                matches!(error.kind(), ErrorKind::Input | ErrorKind::Missing | ErrorKind::Recipe),
+                "{error}"
+            );
             false
         }
     }
@@ -150,7 +153,7 @@ fn use_it(path: &Path, context: &Context<'_>) {
         .map(drop),
     ];
     for error in results.into_iter().filter_map(std::result::Result::err) {
-        let expected = [Kind::Input, Kind::Missing, Kind::Recipe, Kind::Usage];
+        let expected = [ErrorKind::Input, ErrorKind::Missing, ErrorKind::Recipe, ErrorKind::Usage];
         assert!(expected.contains(&error.kind()), "{}: {:?}: {error}", path.display(), error.kind());
     }
 }

@@ -2,7 +2,7 @@
 
 use btfkit::method::stereo::Stereo;
 use btfkit::random::Hash;
-use btfkit::sample::{Kind, Scene, Surface};
+use btfkit::sample::{MaterialKind, Scene, Surface};
 use btfkit::store::enlarged::Enlarged;
 use btfkit::store::model::Model;
 use btfkit_formats::Direction;
@@ -63,7 +63,7 @@ fn a_rendered_height_field_gives_back_its_normals() {
         .iter()
         .map(|angles| Direction::from_degrees(angles.theta_deg(), angles.phi_deg()))
         .collect();
-    let surface = Surface::new(Kind::Leather, 48, 48, 1.0, 3).unwrap();
+    let surface = Surface::new(MaterialKind::Leather, 48, 48, 1.0, 3).unwrap();
     let truth = surface.normals();
     let scene =
         Scene::new(surface, &lights.iter().map(|light| [light.theta_rad, light.phi_rad]).collect::<Vec<_>>());

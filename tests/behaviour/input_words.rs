@@ -183,7 +183,7 @@ fn a_store_in_the_place_of_an_archive_is_told() {
         (
             vec![folder.path().join("new.zarr"), archive.clone()],
             66,
-            "the archive comes first and the store last",
+            "archives come first, and the store to make is named last",
         ),
         (vec![store.clone(), folder.path().join("new.zarr")], 65, "got a store, expected an archive"),
         (vec![store.clone()], 65, "got a store, expected an archive"),

@@ -7,7 +7,7 @@ use btfkit::archive;
 use btfkit::color::{LightnessCodes, Transfer};
 use btfkit::likeness::{Judge, Judgement, Lightness};
 use btfkit::random::Hash;
-use btfkit::sample::{Kind, Scene, Surface};
+use btfkit::sample::{MaterialKind, Scene, Surface};
 use btfkit::shape::{Size, Window};
 use btfkit_formats::Samples;
 use rustfft::FftPlanner;
@@ -20,7 +20,7 @@ use crate::fixture::{btf, fail, fixture, shared, succeed};
 const SIDE: usize = 128;
 
 /// A material of 256x256 texels under one light, seen from above.
-fn sample(kind: Kind) -> Lightness {
+fn sample(kind: MaterialKind) -> Lightness {
     let light = [30f64, 40.0].map(f64::to_radians);
     let scene = Scene::new(Surface::new(kind, 256, 256, 1.0, 3).unwrap(), &[light]);
     let samples = Samples::U8(scene.view(0, [0.0, 0.0]).image(0).unwrap());
@@ -99,7 +99,7 @@ fn judged(material: &Lightness) -> (Judgement, Vec<(&'static str, Judgement)>) {
 #[test]
 fn of_every_material_a_held_out_crop_ranks_before_spoilt_ones() {
     let names = ["corduroy", "wallpaper", "impalla"].map(|name| format!("mlvq-btf/{name}/binary.btf"));
-    let made = [("leather", Kind::Leather), ("wood", Kind::Wood)];
+    let made = [("leather", MaterialKind::Leather), ("wood", MaterialKind::Wood)];
     let made = made.map(|(name, kind)| (name.to_owned(), Some(sample(kind))));
     let materials = made.into_iter().chain(names.map(|name| (name.clone(), measured(&name))));
     for (name, material) in materials.filter_map(|(name, material)| Some((name, material?))) {

@@ -28,20 +28,260 @@ pub(crate) const COMMON: &[(&str, &str)] = &[
     ("force", "whether another result is replaced"),
 ];
 
-/// Commands whose results have no recipe: what lies there is compared byte by byte, or nothing is stored.
-pub(crate) const WITHOUT: &[&str] = &[
-    "demo",
-    "sample",
-    "info",
-    "check",
-    "verify",
-    "curve",
-    "compare",
-    "image",
-    "judge",
-    "completions",
-    "man",
-    "help",
+/// Commands without options that a result depends on, but for what is made.
+pub(crate) const WITHOUT: &[&str] = &["demo", "completions", "man", "help"];
+
+/// What an option does to what a command without a recipe prints or writes.
+pub(crate) enum Shown {
+    /// Another output, beside the second arguments with the first ones than without.
+    Shows(&'static [&'static str], &'static [&'static str]),
+    /// Not to be seen here, for this reason.
+    Unseen(&'static str),
+}
+
+/// A command whose result has no recipe: it is printed, or compared byte by byte with what is there.
+pub(crate) struct Outputs {
+    /// Its name.
+    pub(crate) command: &'static str,
+    /// The arguments that it cannot be without; `{archive}`, `{measurement}`, `{model}`, `{enlarged}` and `{new}`, a
+    /// folder, stand for places.
+    pub(crate) base: &'static [&'static str],
+    /// Each of its options and arguments, by its name in the program.
+    pub(crate) options: &'static [(&'static str, Shown)],
+}
+
+use Shown::{Shows, Unseen};
+
+const ITSELF: Shown = Unseen("what the command is about");
+const READING: Shown = Unseen("as of import, whose recipes show it; refused for stores");
+
+/// All commands whose results have none.
+pub(crate) const OUTPUTS: &[Outputs] = &[
+    Outputs {
+        command: "sample",
+        base: &["{new}/s.zip", "--size", "8x8", "--views", "2", "--lights", "2"],
+        options: &[
+            ("archive", ITSELF),
+            ("material", Shows(&["--material", "wood"], &[])),
+            ("size", Shows(&["--size", "8x9"], &[])),
+            ("views", Shows(&["--views", "3"], &[])),
+            ("lights", Shows(&["--lights", "3"], &[])),
+            ("seed", Shows(&["--seed", "2"], &[])),
+            ("scale", Shows(&["--scale", "2"], &[])),
+        ],
+    },
+    Outputs {
+        command: "info",
+        base: &["{archive}"],
+        options: &[
+            ("paths", ITSELF),
+            ("pieces", Unseen("of archives in pieces")),
+            ("transfer", Shows(&["--transfer", "linear"], &[])),
+            ("samples", Shows(&["--samples", "f16"], &[])),
+            ("azimuth", READING),
+            ("turn", READING),
+            ("transpose", READING),
+            ("swap", Shows(&["--swap"], &[])),
+            ("cosine", READING),
+            ("pattern", READING),
+            ("table", READING),
+            ("order", READING),
+            ("rows", READING),
+            ("hdr", READING),
+            ("drop_view", Shows(&["--drop-view", "1"], &[])),
+            ("json", Shows(&["--json"], &[])),
+        ],
+    },
+    Outputs {
+        command: "check",
+        base: &["{archive}"],
+        options: &[
+            ("paths", ITSELF),
+            ("pieces", Unseen("of archives in pieces")),
+            ("picture", Shows(&["--picture", "{new}/p.png"], &[])),
+            ("transfer", READING),
+            ("samples", READING),
+            ("azimuth", Shows(&["--json", "--azimuth", "mirrored-lights"], &["--json"])),
+            ("turn", READING),
+            ("transpose", READING),
+            ("swap", READING),
+            ("cosine", READING),
+            ("pattern", READING),
+            ("table", READING),
+            ("order", READING),
+            ("rows", READING),
+            ("hdr", READING),
+            ("drop_view", READING),
+            ("json", Shows(&["--json"], &[])),
+        ],
+    },
+    Outputs {
+        command: "verify",
+        base: &["{measurement}"],
+        options: &[
+            ("stores", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("archive", Shows(&["--source", "{archive}"], &[])),
+            ("transfer", READING),
+            ("samples", READING),
+            ("azimuth", READING),
+            ("turn", READING),
+            ("transpose", READING),
+            ("swap", READING),
+            ("cosine", READING),
+            ("pattern", READING),
+            ("table", READING),
+            ("order", READING),
+            ("rows", READING),
+            ("hdr", READING),
+            ("drop_view", READING),
+            ("json", Shows(&["--json"], &[])),
+        ],
+    },
+    Outputs {
+        command: "curve",
+        base: &["{measurement}", "{model}", "--most", "4"],
+        options: &[
+            ("measurement", ITSELF),
+            ("model", ITSELF),
+            ("out", Shows(&["--out", "{new}/c.png"], &[])),
+            ("json", Shows(&["--json"], &[])),
+            ("most", Shows(&["--most", "2"], &[])),
+            ("seed", Shows(&["--json", "--seed", "9"], &["--json"])),
+        ],
+    },
+    Outputs {
+        command: "compare",
+        base: &["{model}", "{measurement}"],
+        options: &[
+            ("model", ITSELF),
+            ("measurement", ITSELF),
+            ("picture", Shows(&["--picture", "{new}/p.png"], &[])),
+            (
+                "light",
+                Shows(&["--light", "30,90", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"]),
+            ),
+            ("view", Shows(&["--view", "15,0", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"])),
+            ("json", Shows(&["--json"], &[])),
+        ],
+    },
+    Outputs {
+        command: "image",
+        base: &["{model}", "--out", "{new}/i.png"],
+        options: &[
+            ("source", ITSELF),
+            ("out", Unseen("the name of the result, and its format")),
+            ("bits", Shows(&["--bits", "16"], &[])),
+            ("quality", Shows(&["--out", "{new}/i.jpg", "--quality", "50"], &["--out", "{new}/i.jpg"])),
+            ("what", Shows(&["--what", "index"], &[])),
+            ("light", Shows(&["--light", "30,90"], &[])),
+            ("view", Shows(&["--view", "15,0"], &[])),
+            ("window", Shows(&["--window", "0,0,16,16"], &[])),
+            ("exposure", Shows(&["--exposure", "2"], &[])),
+            ("values", Shows(&["--values", "measured"], &[])),
+            ("measurement", Shows(&["--measurement", "{measurement}"], &[])),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("plane", Shows(&["--plane", "--window", "0,0,16,16"], &["--window", "0,0,16,16"])),
+            (
+                "seed",
+                Shows(
+                    &["--plane", "--window", "0,0,16,16", "--seed", "2"],
+                    &["--plane", "--window", "0,0,16,16"],
+                ),
+            ),
+            (
+                "jitter",
+                Shows(
+                    &["--plane", "--window", "0,0,64,64", "--jitter", "0"],
+                    &["--plane", "--window", "0,0,64,64"],
+                ),
+            ),
+        ],
+    },
+    Outputs {
+        command: "judge",
+        base: &["{enlarged}", "--against", "{measurement}", "--crop", "16", "--pair", "0,1"],
+        options: &[
+            ("subject", ITSELF),
+            ("against", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("size", Unseen("of the plane of a model, which has no other size; refused for enlargements")),
+            ("pair", Shows(&["--pair", "0,2"], &[])),
+            ("crop", Shows(&["--crop", "32"], &[])),
+            ("json", Shows(&["--json", "{new}/j.json"], &[])),
+            ("sheet", Shows(&["--sheet", "{new}/j.png"], &[])),
+        ],
+    },
+];
+
+/// Command lines with an option that would change nothing, and that option: they are refused, and nothing is written.
+pub(crate) const IDLE: &[(&[&str], &str)] = &[
+    (&["image", "{model}", "--out", "{new}/x.png", "--what", "index", "--light", "1,0"], "--light"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--what", "normals", "--view", "1,0"], "--view"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--what", "index", "--exposure", "2"], "--exposure"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--what", "index", "--values", "measured"], "--values"),
+    (
+        &["image", "{model}", "--out", "{new}/x.png", "--values", "model", "--measurement", "{measurement}"],
+        "--measurement",
+    ),
+    (&["image", "{measurement}", "--out", "{new}/x.png", "--values", "model"], "--values"),
+    (&["image", "{measurement}", "--out", "{new}/x.png", "--measurement", "{measurement}"], "--measurement"),
+    (&["image", "{measurement}", "--out", "{new}/x.png", "--model", "{model}"], "--model"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--model", "{model}"], "--model"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--quality", "50"], "--quality"),
+    (&["image", "{model}", "--out", "{new}/x.exr", "--bits", "8"], "--bits"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--seed", "2"], "--plane"),
+    (&["image", "{model}", "--out", "{new}/x.png", "--jitter", "1"], "--plane"),
+    (&["image", "{measurement}", "--out", "{new}/x.png", "--plane", "--window", "0,0,9,9"], "plane"),
+    (&["compare", "{model}", "{measurement}", "--light", "30,0"], "--picture"),
+    (&["compare", "{model}", "{measurement}", "--view", "30,0"], "--picture"),
+    (&["judge", "{enlarged}", "--against", "{measurement}", "--size", "64x64"], "--size"),
+    (&["judge", "{model}", "--against", "{measurement}", "--size", "64x64", "--model", "{model}"], "--model"),
+    (&["verify", "{measurement}", "--transpose"], "--transpose"),
+    (&["verify", "{measurement}", "--model", "{model}"], "--model"),
+    (&["verify", "{model}", "--model", "{model}"], "--model"),
+    (&["verify", "{model}", "--source", "{archive}"], "archive"),
+    (&["info", "{measurement}", "--swap"], "--swap"),
+    (&["info", "--pieces", "{measurement}", "{measurement}"], "--pieces"),
+    (&["check", "{measurement}", "--azimuth", "mirrored"], "--azimuth"),
+    (&["check", "--pieces", "{measurement}", "{archive}"], "--pieces"),
+    (&["cluster", "{measurement}", "{model}", "--step", "prepare", "--pass", "0"], "--pass"),
+    (&["cluster", "{measurement}", "{model}", "--step", "prepare", "--shard", "0/2"], "--shard"),
+    (&["cluster", "{measurement}", "{model}", "--step", "reduce", "--shard", "0/2"], "--shard"),
+    (&["cluster", "{measurement}", "{model}", "--shard", "0/2"], "--step"),
+    (&["cluster", "{measurement}", "{model}", "--pass", "0"], "--step"),
+    (&["cluster", "{measurement}", "{model}", "--clusters-of", "{model}", "--seed", "2"], "--seed"),
+    (&["cluster", "{measurement}", "{model}", "--clusters-of", "{model}", "--passes", "2"], "--passes"),
+    (
+        &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "paper", "--jitter", "0"],
+        "--jitter",
+    ),
+    (
+        &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "paper", "--no-source"],
+        "--no-source",
+    ),
+    (&["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--tiles", "3"], "--tiles"),
+    (&["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--candidates", "3"], "--candidates"),
+    (&["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--band", "3"], "--band"),
+    (
+        &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "paper", "--shard", "0/2"],
+        "--shard",
+    ),
+    (
+        &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "quilt", "--shard", "0/2"],
+        "--shard",
+    ),
+    (&["export", "{measurement}", "{new}/e.npy", "--rank", "2"], "--rank"),
+    (&["export", "{measurement}", "{new}/e.npy", "--quality", "50"], "--quality"),
+    (&["export", "{measurement}", "{new}/e.zip", "--light", "1,0"], "--light"),
+    (&["export", "{model}", "{new}/e.dzi", "--quality", "50"], "--quality"),
+    (&["export", "{model}", "{new}/e.dzi", "--rank", "2"], "--rank"),
+    (
+        &["export", "{model}", "{new}/e.dzi", "--values", "model", "--measurement", "{measurement}"],
+        "--measurement",
+    ),
+    (&["export", "{measurement}", "{new}/e.dzi", "--values", "measured"], "--values"),
+    (&["export", "{model}", "{new}/e.dzi", "--model", "{model}"], "--model"),
 ];
 
 const PLACE: Effect = Effect::Apart("a place, not what lies there");

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 
 use crate::fixture::{Fixture, btf, fail, fixture, model_of, succeed, tree};
-use crate::option_effects::{Effect, RECIPES};
+use crate::option_effects::{Effect, IDLE, OUTPUTS, RECIPES, Shown};
 
 /// Arguments of each command that prints its recipe.
 fn dry_run(command: &str, fixture: &Fixture, folder: &Path) -> Command {
@@ -61,6 +61,64 @@ fn every_option_that_changes_bytes_changes_the_recipe_and_no_other_does() {
                 Effect::Apart(_) => {}
             }
         }
+    }
+}
+
+/// A command line whose places are those of the fixture, and a folder for what it makes.
+fn placed(arguments: &[&str], new: &Path) -> Command {
+    let fixture = fixture();
+    let places = [
+        ("{archive}", fixture.archive()),
+        ("{measurement}", fixture.measurement()),
+        ("{model}", fixture.model()),
+        ("{enlarged}", fixture.enlarged()),
+        ("{new}", new.to_owned()),
+    ];
+    let mut command = btf();
+    for argument in arguments {
+        let placed = places
+            .iter()
+            .fold((*argument).to_owned(), |text, (name, place)| text.replace(name, place.to_str().unwrap()));
+        command.arg(placed);
+    }
+    command
+}
+
+#[test]
+fn every_option_of_a_command_without_a_recipe_shows() {
+    for of in OUTPUTS {
+        // What is printed, and every file that is made.
+        let made = |options: &[&str]| {
+            let folder = tempfile::tempdir().unwrap();
+            let mut words = vec![of.command];
+            let mut base = of.base.iter();
+            while let Some(word) = base.next() {
+                // An option that is given again takes the place of the one that is there.
+                if word.starts_with("--") && options.contains(word) {
+                    base.next();
+                } else {
+                    words.push(word);
+                }
+            }
+            words.extend(options);
+            let told = succeed(&mut placed(&words, folder.path()));
+            (told.replace(folder.path().to_str().unwrap(), ""), tree(folder.path()))
+        };
+        for (option, shown) in of.options {
+            if let Shown::Shows(with, beside) = shown {
+                assert_ne!(made(with), made(beside), "{} {option} changes nothing", of.command);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_option_that_would_change_nothing_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, option) in IDLE {
+        let told = fail(&mut placed(arguments, folder.path()), 2);
+        assert!(told.contains(option), "{arguments:?}: {told}");
+        assert_eq!(tree(folder.path()).len(), 0, "{arguments:?}");
     }
 }
 

@@ -20,8 +20,8 @@ fn tile(model: &Path, options: &[&str]) -> std::process::Command {
 /// The setting `key` of the recipe of a model's tile, and its report.
 fn of(model: &Path, key: &str) -> (Option<String>, Report) {
     let model = Model::open(model).unwrap();
-    let stage = model.stage(Stage::Tile).unwrap().unwrap();
-    let setting = stage["recipe"].get(key).and_then(Value::as_str).map(str::to_owned);
+    let recipe = model.recipe_text(Stage::Tile).unwrap().unwrap();
+    let setting = recipe.get(key).and_then(Value::as_str).map(str::to_owned);
     (setting, model.report(Stage::Tile).unwrap())
 }
 

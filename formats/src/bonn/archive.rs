@@ -6,7 +6,7 @@ use super::bdi::Bdi;
 use super::factors::Factors;
 use super::header::{Header, read_rotations};
 use super::images::{self, Plane};
-use super::signature::{Kind, Signature, readings};
+use super::signature::{BonnKind, Signature, readings};
 use crate::reader::Reader;
 use crate::words::counted;
 use crate::{Contents, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
@@ -33,7 +33,7 @@ pub struct OpenOptions {
 #[derive(Debug)]
 pub struct Archive {
     contents: Contents,
-    kind: Kind,
+    kind: BonnKind,
     payload: Payload,
     rotations: Vec<[f32; 9]>,
     plane: Plane,
@@ -60,7 +60,7 @@ impl Archive {
     pub fn open(bytes: &[u8], options: &OpenOptions, limits: &Limits) -> Result<Archive> {
         let (signature, header, mut reader) = read_header(bytes, limits)?;
         let kind = signature.kind;
-        let (payload, rotations) = if kind == Kind::Bdi {
+        let (payload, rotations) = if kind == BonnKind::Bdi {
             let (bdi, rotations) = Bdi::read(&mut reader, &header, limits)?;
             (Payload::Bdi(bdi), rotations)
         } else {
@@ -92,7 +92,7 @@ impl Archive {
     }
 
     /// Which of the containers it is.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> BonnKind {
         self.kind
     }
 
@@ -200,12 +200,12 @@ fn describe(
     }
 }
 
-fn format_name(kind: Kind, payload: &Payload) -> String {
+fn format_name(kind: BonnKind, payload: &Payload) -> String {
     let name = match kind {
-        Kind::Dfmf => "DFMF",
-        Kind::Fmf | Kind::FmfExtended => "FMF",
-        Kind::Pvf => "PVF",
-        Kind::Bdi => "BDI",
+        BonnKind::Dfmf => "DFMF",
+        BonnKind::Fmf | BonnKind::FmfExtended => "FMF",
+        BonnKind::Pvf => "PVF",
+        BonnKind::Bdi => "BDI",
     };
     match payload {
         Payload::Factors(factors) => format!("Bonn {name}, {}", factors.describe()),
@@ -280,7 +280,7 @@ fn remarks(
     }
     match payload {
         Payload::Factors(factors) => {
-            if signature.kind == Kind::Dfmf {
+            if signature.kind == BonnKind::Dfmf {
                 let (code, name) = factors.color.describe();
                 list.push(("colour model, undone", format!("{code} ({name})")));
             }

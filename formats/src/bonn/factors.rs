@@ -3,7 +3,7 @@
 use super::color::ColorModel;
 use super::header::{Header, length};
 use super::scalar::Scalar;
-use super::signature::Kind;
+use super::signature::BonnKind;
 use crate::reader::Reader;
 use crate::words::counted;
 use crate::{Error, ErrorKind, Result};
@@ -117,11 +117,11 @@ impl Sizes {
 
 impl Factors {
     /// Reads all but the matrices and checks that these are there.
-    pub(super) fn read(reader: &mut Reader<'_>, kind: Kind, header: &Header) -> Result<Factors> {
+    pub(super) fn read(reader: &mut Reader<'_>, kind: BonnKind, header: &Header) -> Result<Factors> {
         match kind {
-            Kind::Dfmf => Factors::read_dfmf(reader, header),
-            Kind::Pvf => Factors::read_pvf(reader, header),
-            _ => Factors::read_fmf(reader, kind == Kind::FmfExtended, header),
+            BonnKind::Dfmf => Factors::read_dfmf(reader, header),
+            BonnKind::Pvf => Factors::read_pvf(reader, header),
+            _ => Factors::read_fmf(reader, kind == BonnKind::FmfExtended, header),
         }
     }
 

@@ -1,6 +1,6 @@
 //! What all containers have in front: the description of the measurement, directions, the plane's size.
 
-use super::signature::Kind;
+use super::signature::BonnKind;
 use crate::reader::Reader;
 use crate::words::counted;
 use crate::{Direction, Error, ErrorKind, Limits, Result};
@@ -39,8 +39,8 @@ pub(super) struct Header {
 
 impl Header {
     /// Reads all up to the plane's size (in the older form of PVF: up to the directions).
-    pub(super) fn read(reader: &mut Reader<'_>, kind: Kind, limits: &Limits) -> Result<Header> {
-        if kind == Kind::Pvf && reader.clone().i32_le()? == LEGACY_PVF {
+    pub(super) fn read(reader: &mut Reader<'_>, kind: BonnKind, limits: &Limits) -> Result<Header> {
+        if kind == BonnKind::Pvf && reader.clone().i32_le()? == LEGACY_PVF {
             reader.take(4)?;
             return Header::read_legacy(reader, limits);
         }

@@ -1,8 +1,9 @@
 //! The functions of a database, and their values under one pair of directions.
 //!
-//! A pixel is a factor times a 4D function. A 4D function is a list of 3D functions over the view's phi, a 3D function a list of 2D
-//! functions over the view's theta, each with a factor; a 2D function is luminance and colour over two angles of the light, alpha and
-//! beta. There are hundreds of 4D functions and tens of thousands of pixels, so that the functions are evaluated once for an image.
+//! A pixel is a factor times a 4D function. A 4D function is a list of 3D functions over the view's phi, a 3D function
+//! a list of 2D functions over the view's theta, each with a factor; a 2D function is luminance and colour over two
+//! angles of the light, alpha and beta. There are hundreds of 4D functions and tens of thousands of pixels, so that the
+//! functions are evaluated once for an image.
 
 use super::header::Header;
 use super::table::{FloatTable, IntTable, require_end};
@@ -94,7 +95,7 @@ struct Light {
 }
 
 impl Functions {
-    /// Reads the tables, which end the file. Zero bytes are not settled yet.
+    /// Reads the tables, which end the file. Zero bytes are not resolved yet.
     pub(super) fn read(reader: &mut Reader<'_>, header: &Header) -> Result<Functions> {
         let h = header;
         let (width, height) = (side(h.width), side(h.height));
@@ -227,8 +228,8 @@ impl Functions {
     }
 }
 
-/// Weights of the cubic Hermite interpolation that the encoder's authors publish: slopes are central differences inside, but at the right
-/// node half of the interval's own difference, and whole one-sided differences at both ends.
+/// Weights of the cubic Hermite interpolation that the encoder's authors publish: slopes are central differences
+/// inside, but at the right node half of the interval's own difference, and whole one-sided differences at both ends.
 fn hermite(beta: Between, nodes: usize) -> [f64; 3] {
     let u = beta.weight;
     let (u2, u3) = (u * u, u * u * u);
@@ -262,7 +263,8 @@ mod tests {
         let between = |lower, weight| Between { lower, upper: lower + 1, weight };
         assert_eq!(hermite(between(2, 0.0), 5), [0.0, 1.0, 0.0]);
         assert_eq!(hermite(between(1, 1.0), 5), [0.0, 0.0, 1.0]);
-        // In the middle the curve is half of either node, and an eighth of the slope at the left less that at the right.
+        // In the middle the curve is half of either node, and an eighth of the slope at the left less that at the
+        // right.
         assert_eq!(hermite(between(1, 0.5), 5), [-0.0625, 0.5625, 0.5]);
         assert_eq!(hermite(between(0, 0.5), 5), [0.0, 0.4375, 0.5625]);
         assert_eq!(hermite(between(3, 0.5), 5), [-0.0625, 0.625, 0.4375]);

@@ -27,8 +27,8 @@ pub(super) struct IntTable {
 impl IntTable {
     /// Reads a table whose values must be `first .. first + count`, and counts them from 0.
     ///
-    /// A value is packed, least significant bit first, in as many bits as the largest less the smallest needs. A table of one
-    /// value takes no bits at all, so that its size is held against the rest of the file.
+    /// A value is packed, least significant bit first, in as many bits as the largest less the smallest needs. A table
+    /// of one value takes no bits at all, so that its size is held against the rest of the file.
     pub(super) fn read(
         reader: &mut Reader<'_>,
         rows: usize,
@@ -99,7 +99,7 @@ fn unpack(packed: &[u8], width: u32, count: usize) -> impl Iterator<Item = u32> 
 /// Real numbers in one byte each, row-major.
 ///
 /// Byte q stands for min + q (max - min) / 256. The maximum would be 256 and wraps to 0, so that a zero byte may be
-/// either end of the range; [`FloatTable::zeros`] lists them, and until they are settled they stand for the minimum.
+/// either end of the range; [`FloatTable::zeros`] lists them, and until they are resolved they stand for the minimum.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FloatTable {
     pub(super) rows: usize,
@@ -151,7 +151,7 @@ impl FloatTable {
         self.values.chunks_exact(self.columns)
     }
 
-    /// Settles the zero byte at `place`.
+    /// Resolves the zero byte at `place`.
     pub(super) fn set(&mut self, place: usize, to_max: bool) {
         let value = if to_max { self.max } else { self.min };
         if let Some(slot) = self.values.get_mut(place) {

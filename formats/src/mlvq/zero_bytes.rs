@@ -6,11 +6,11 @@
 //! 2. A 1D luminance function is a density: its row sums to 1, up to the quantisation.
 //! 3. A scale was chosen so that the function that it scales keeps the mean of the function that was measured. What
 //!    was measured is continuous: over alpha, view theta, view phi, and over the surface. So the scaled mean at the
-//!    entry should be the mean of the scaled means beside it. A colour, likewise, is near to those that stand beside it in
-//!    functions over beta.
+//!    entry should be the mean of the scaled means beside it. A colour, likewise, is near to those that stand beside it
+//! in    functions over beta.
 //!
-//! Facts 2 and 3 give for every entry a wanted value; the nearer end of the range is taken. If that leaves a table without one of
-//! its ends, the entry that was decided most narrowly goes the other way.
+//! Facts 2 and 3 give for every entry a wanted value; the nearer end of the range is taken. If that leaves a table
+//! without one of its ends, the entry that was decided most narrowly goes the other way.
 
 use super::functions::Functions;
 use super::table::FloatTable;
@@ -36,11 +36,12 @@ struct Entry {
 
 impl ZeroBytes {
     /// Reads lines `table row column value`, with anything after the fourth word; `#` starts a comment. Tables are
-    /// `PDF6Dscale`, `PDF1Dslice`, `colors`, `PDF2Dscale`, `PDF3Dscale` and `PDF4Dscale`, rows and columns count from 0, and the
-    /// value is the table's minimum or maximum.
+    /// `PDF6Dscale`, `PDF1Dslice`, `colors`, `PDF2Dscale`, `PDF3Dscale` and `PDF4Dscale`, rows and columns count from
+    /// 0, and the value is the table's minimum or maximum.
     ///
     /// # Errors
-    /// [`ErrorKind::Malformed`], with the byte where the line starts: another table, a word missing, not a number, an entry twice.
+    /// [`ErrorKind::Malformed`], with the byte where the line starts: another table, a word missing, not a number, an
+    /// entry twice.
     ///
     /// ```
     /// use btfkit_formats::mlvq::ZeroBytes;
@@ -100,8 +101,8 @@ impl ZeroBytes {
         Some(position_of(table, entry.value) > 0.5)
     }
 
-    /// Every entry must be of the table. About a zero byte it must name one of its two values; about another one, or in a
-    /// table of one value, it changes nothing and must only say what is there.
+    /// Every entry must be of the table. About a zero byte it must name one of its two values; about another one, or in
+    /// a table of one value, it changes nothing and must only say what is there.
     fn check(&self, table: &FloatTable, name: &str) -> Result<()> {
         // Half a step of the quantisation, and what a text of six decimals leaves of a value.
         let range = f64::from(table.max) - f64::from(table.min);
@@ -142,31 +143,31 @@ fn position_of(table: &FloatTable, value: f64) -> f64 {
     (value - f64::from(table.min)) / (f64::from(table.max) - f64::from(table.min))
 }
 
-/// How many zero bytes there were, and how they were settled.
+/// How many zero bytes there were, and how they were resolved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Settled {
+pub(super) struct Resolved {
     pub(super) known: usize,
     pub(super) by_rule: usize,
 }
 
-/// Settles the zero bytes of one table; `wanted` is the value that an entry should be near to.
-fn settle(
+/// Resolves the zero bytes of one table; `wanted` is the value that an entry should be near to.
+fn resolve(
     table: &mut FloatTable,
     name: &str,
     given: &ZeroBytes,
     wanted: impl Fn(&FloatTable, usize) -> Option<f64>,
-) -> Result<Settled> {
+) -> Result<Resolved> {
     given.check(table, name)?;
-    let mut settled = Settled::default();
+    let mut resolved = Resolved::default();
     let (mut any_min, mut any_max) = (false, false);
     let mut narrowest: Option<(f64, usize, bool)> = None;
     let mut decided = Vec::with_capacity(table.zeros.len());
     for &place in &table.zeros {
         let to_max = if let Some(to_max) = given.known(table, name, place) {
-            settled.known = settled.known.saturating_add(1);
+            resolved.known = resolved.known.saturating_add(1);
             to_max
         } else {
-            settled.by_rule = settled.by_rule.saturating_add(1);
+            resolved.by_rule = resolved.by_rule.saturating_add(1);
             let position = wanted(table, place).map_or(0.5, |value| position_of(table, value));
             let margin = (position - 0.5).abs();
             let to_max = position > 0.5;
@@ -185,11 +186,11 @@ fn settle(
     if let Some((_, place, to_max)) = narrowest.filter(|_| !(any_min && any_max) && table.zeros.len() > 1) {
         table.set(place, !to_max);
     }
-    Ok(settled)
+    Ok(resolved)
 }
 
 /// The mean of `value` at places that are not zero bytes themselves.
-fn mean_of_settled(
+fn mean_of_resolved(
     table: &FloatTable,
     places: impl Iterator<Item = (usize, usize)>,
     value: impl Fn(usize, usize) -> f64,
@@ -223,8 +224,9 @@ fn continuous_scale(
 ) -> Option<f64> {
     let (row, column) = table.position(place);
     let places = beside(column, table.columns, closed).map(|column| (row, column));
-    let target =
-        mean_of_settled(table, places, |row, column| means(row, column) * f64::from(table.get(row, column)))?;
+    let target = mean_of_resolved(table, places, |row, column| {
+        means(row, column) * f64::from(table.get(row, column))
+    })?;
     let mean = means(row, column);
     (mean > 0.0).then(|| target / mean)
 }
@@ -242,24 +244,24 @@ fn at(list: &[f64], place: usize) -> f64 {
     list.get(place).copied().unwrap_or(0.0)
 }
 
-/// Settles all zero bytes, from the innermost functions outwards, since means of one level rest on those below.
-pub(super) fn settle_all(tables: &mut Functions, given: &ZeroBytes) -> Result<Settled> {
-    let mut total = Settled::default();
-    let mut add = |settled: Settled| {
-        total.known = total.known.saturating_add(settled.known);
-        total.by_rule = total.by_rule.saturating_add(settled.by_rule);
+/// Resolves all zero bytes, from the innermost functions outwards, since means of one level rest on those below.
+pub(super) fn resolve_all(tables: &mut Functions, given: &ZeroBytes) -> Result<Resolved> {
+    let mut total = Resolved::default();
+    let mut add = |resolved: Resolved| {
+        total.known = total.known.saturating_add(resolved.known);
+        total.by_rule = total.by_rule.saturating_add(resolved.by_rule);
     };
     // While a row is summed its own zero bytes stand for the minimum, which is what `read` set.
-    add(settle(&mut tables.luminance_1d, "PDF1Dslice", given, |table, place| {
+    add(resolve(&mut tables.luminance_1d, "PDF1Dslice", given, |table, place| {
         let (row, _) = table.position(place);
         let sum: f64 = table.rows().nth(row)?.iter().map(|&v| f64::from(v)).sum();
         Some(f64::from(table.min) + 1.0 - sum)
     })?);
     let neighbours = color_neighbours(tables);
-    add(settle(&mut tables.colors, "colors", given, |_, place| {
+    add(resolve(&mut tables.colors, "colors", given, |_, place| {
         neighbours.get(place).and_then(|&(sum, count)| (count > 0.0).then(|| sum / count))
     })?);
-    add(settle(&mut tables.scale_2d, "PDF2Dscale", given, |table, place| {
+    add(resolve(&mut tables.scale_2d, "PDF2Dscale", given, |table, place| {
         continuous_scale(table, place, false, |_, _| 1.0)
     })?);
     let luminances_2d = scaled_means(&tables.scale_2d, |_, _| 1.0);
@@ -272,25 +274,25 @@ pub(super) fn settle_all(tables: &mut Functions, given: &ZeroBytes) -> Result<Se
 
     let slices = &tables.slices_3d;
     let mean = |row, column| at(&means_2d, slices.get(row, column));
-    add(settle(&mut tables.scale_3d, "PDF3Dscale", given, |table, place| {
+    add(resolve(&mut tables.scale_3d, "PDF3Dscale", given, |table, place| {
         continuous_scale(table, place, false, mean)
     })?);
     let means_3d = scaled_means(&tables.scale_3d, mean);
 
     let slices = &tables.slices_4d;
     let mean = |row, column| at(&means_3d, slices.get(row, column));
-    add(settle(&mut tables.scale_4d, "PDF4Dscale", given, |table, place| {
+    add(resolve(&mut tables.scale_4d, "PDF4Dscale", given, |table, place| {
         continuous_scale(table, place, true, mean)
     })?);
     let means_4d = scaled_means(&tables.scale_4d, mean);
 
     let slices = &tables.slices_6d;
     let mean = |row, column| at(&means_4d, slices.get(row, column));
-    add(settle(&mut tables.scale_6d, "PDF6Dscale", given, |table, place| {
+    add(resolve(&mut tables.scale_6d, "PDF6Dscale", given, |table, place| {
         let (row, column) = table.position(place);
         let vertical = beside(row, table.rows, false).map(|row| (row, column));
         let places = beside(column, table.columns, false).map(|column| (row, column)).chain(vertical);
-        let target = mean_of_settled(table, places, |row, column| {
+        let target = mean_of_resolved(table, places, |row, column| {
             mean(row, column) * f64::from(table.get(row, column))
         })?;
         (mean(row, column) > 0.0).then(|| target / mean(row, column))
@@ -298,7 +300,8 @@ pub(super) fn settle_all(tables: &mut Functions, given: &ZeroBytes) -> Result<Se
     Ok(total)
 }
 
-/// For every entry of the colour table, sum and number of the settled entries that stand beside its colour in functions over beta.
+/// For every entry of the colour table, sum and number of the resolved entries that stand beside its colour in
+/// functions over beta.
 fn color_neighbours(tables: &Functions) -> Vec<(f64, f64)> {
     let colors = &tables.colors;
     let mut sums = vec![(0.0, 0.0); colors.values.len()];
@@ -331,20 +334,21 @@ mod tests {
     use crate::mlvq::header::Header;
     use crate::reader::Reader;
 
-    /// Tables as the rule settles them, and what the text twins say; nothing where the measured files are not beside the checkout.
-    fn settled_by_rule(material: &str) -> Option<(Functions, ZeroBytes)> {
+    /// Tables as the rule resolves them, and what the text copies say; nothing where the measured files are not beside
+    /// the checkout.
+    fn resolved_by_rule(material: &str) -> Option<(Functions, ZeroBytes)> {
         let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/mlvq-btf");
         let bytes = std::fs::read(data.join(material).join("binary.btf")).ok()?;
         let text = std::fs::read_to_string(data.join(material).join("zero_bytes.txt")).unwrap();
         let mut reader = Reader::new(&bytes);
         let header = Header::read(&mut reader, &Limits::default()).unwrap();
         let mut functions = Functions::read(&mut reader, &header).unwrap();
-        settle_all(&mut functions, &ZeroBytes::default()).unwrap();
+        resolve_all(&mut functions, &ZeroBytes::default()).unwrap();
         Some((functions, ZeroBytes::parse(&text).unwrap()))
     }
 
     #[test]
-    fn rule_agrees_with_the_text_twins() {
+    fn rule_agrees_with_the_text_copies() {
         // Two factors of corduroy, of 2 % at one azimuth of the view, go against their neighbours.
         let against = ["PDF4Dscale 529 3", "PDF4Dscale 642 3"];
         for (material, count, expected) in [
@@ -353,7 +357,7 @@ mod tests {
             ("impalla", 15, &[]),
             ("wallpaper", 17, &[]),
         ] {
-            let Some((tables, text)) = settled_by_rule(material) else { return };
+            let Some((tables, text)) = resolved_by_rule(material) else { return };
             assert_eq!(text.len(), count, "{material}");
             let wrong = text.entries.iter().filter(|entry| {
                 let table = match entry.table {

@@ -1,6 +1,6 @@
 //! Bonn containers: every signature, scalar size, orientation and header is read for what it says.
 
-use btfkit_formats::bonn::{Archive, Kind, OpenOptions, RowOrder, recognise};
+use btfkit_formats::bonn::{Archive, BonnKind, OpenOptions, RowOrder, recognise};
 use btfkit_formats::{ErrorKind, Images, Limits, SampleType, Samples};
 
 use crate::bonn_support::{Btf, directions, names, put_scalars, put_u32s};
@@ -44,7 +44,7 @@ fn every_signature_scalar_and_orientation_is_read() {
                     let mut bytes = btf.head(signature, rotations);
                     bytes.extend(btf.dfmf(size, 0, transposed));
                     check_images(&name(signature), &bytes, &btf, |at, c| btf.dfmf_value(at, c));
-                    assert_eq!(recognise(&bytes), Some(Kind::Dfmf));
+                    assert_eq!(recognise(&bytes), Some(BonnKind::Dfmf));
                 }
                 let fmf = |at, c| {
                     if transposed { btf.transposed_fmf_value(at, c) } else { btf.fmf_value(at, c) }
@@ -53,14 +53,14 @@ fn every_signature_scalar_and_orientation_is_read() {
                     let mut bytes = btf.head(signature, rotations);
                     bytes.extend(btf.fmf(size, transposed));
                     check_images(&name(signature), &bytes, &btf, fmf);
-                    assert_eq!(recognise(&bytes), Some(Kind::Fmf));
+                    assert_eq!(recognise(&bytes), Some(BonnKind::Fmf));
                 }
                 for (signature, rotations) in [("!FMF12FCER", true), ("!FMF12FCE", false)] {
                     let mut bytes = btf.head(signature, rotations);
                     bytes.push(0);
                     bytes.extend(btf.fmf(size, transposed));
                     check_images(&name(signature), &bytes, &btf, fmf);
-                    assert_eq!(recognise(&bytes), Some(Kind::FmfExtended));
+                    assert_eq!(recognise(&bytes), Some(BonnKind::FmfExtended));
                 }
                 for (signature, rotations) in [("!PVF06FCR", true), ("!PVF06FC", false)] {
                     let mut bytes = btf.head(signature, rotations);
@@ -68,7 +68,7 @@ fn every_signature_scalar_and_orientation_is_read() {
                     check_images(&name(signature), &bytes, &btf, |at, c| {
                         if transposed { btf.transposed_pvf_value(at, c) } else { btf.pvf_value(at, c) }
                     });
-                    assert_eq!(recognise(&bytes), Some(Kind::Pvf));
+                    assert_eq!(recognise(&bytes), Some(BonnKind::Pvf));
                 }
             }
         }
@@ -291,7 +291,7 @@ fn uncompressed_files_are_read_full_and_sparse() {
     let archive = open(&sparse);
     assert_eq!(archive.contents().format, "Bonn BDI, f16, sparse");
     assert_eq!(remark(&archive, "pixels marked as missing"), Some("58, read as 0"));
-    assert_eq!((archive.kind(), archive.rotations().len()), (Kind::Bdi, 1));
+    assert_eq!((archive.kind(), archive.rotations().len()), (BonnKind::Bdi, 1));
     assert!(archive.contents().assumptions.iter().any(|text| text.contains("mask")));
     let error = refusal(&btf.bdi(1, |_| true));
     assert!(error.kind() == ErrorKind::Unsupported && error.to_string().contains("bzip2"), "{error}");

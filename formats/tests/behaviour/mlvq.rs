@@ -72,8 +72,9 @@ fn values_are_those_of_another_decoder() {
             compared += 1;
         }
         assert_eq!(compared, 200, "{material}");
-        // The other decoder works on the text twins, whose densities of 0.01 to 0.3 have six decimals. Half of the last
-        // one times a luminance scale of up to 2363, and 1.164 of YCbCr, is 0.0014; what is found is 0.0009 at most.
+        // The other decoder works on the text copies, whose densities of 0.01 to 0.3 have six decimals. Half of the
+        // last one times a luminance scale of up to 2363, and 1.164 of YCbCr, is 0.0014; what is found is 0.0009 at
+        // most.
         assert!(worst < 9e-4, "{material}: {worst}");
     }
 }

@@ -14,7 +14,8 @@ use crate::error::{Error, Result};
 use crate::shape::{Size, Window};
 use crate::words::counted;
 
-/// An HDF5 archive, listed but with no samples read. Can be read from several threads; the C library serves one at a time.
+/// An HDF5 archive, listed but with no samples read. Can be read from several threads; the C library serves one at a
+/// time.
 pub struct Archive {
     path: PathBuf,
     limits: Limits,
@@ -31,9 +32,9 @@ impl Archive {
     /// Opens a file and checks that all that it declares is there, without reading samples.
     ///
     /// # Errors
-    /// [`crate::Kind::Input`]: no HDF5 file, a damaged one, one of neither layout, data that lie elsewhere or are
-    /// packed by other filters than deflate, shuffle and fletcher32, extents beyond the limits or beyond the file, directions that
-    /// make no complete grid of views and lights.
+    /// [`crate::ErrorKind::Input`]: no HDF5 file, a damaged one, one of neither layout, data that lie elsewhere or are
+    /// packed by other filters than deflate, shuffle and fletcher32, extents beyond the limits or beyond the file,
+    /// directions that make no complete grid of views and lights.
     pub fn open(path: &Path, limits: &Limits) -> Result<Self> {
         // The bindings index some lists by counts that the file gives (parameters of a filter, for one).
         catch_unwind(AssertUnwindSafe(|| Self::open_layout(path, limits))).unwrap_or_else(|_| {
@@ -85,8 +86,8 @@ impl Archive {
         }
     }
 
-    /// A window of one view under all lights, `[y, x, light, channel]`. Of our own layout this reads what it returns and
-    /// little more, as long as the window's sides are multiples of 16.
+    /// A window of one view under all lights, `[y, x, light, channel]`. Of our own layout this reads what it returns
+    /// and little more, as long as the window's sides are multiples of 16.
     ///
     /// # Errors
     /// As [`Archive::read_images`]; a window that reaches beyond the images.

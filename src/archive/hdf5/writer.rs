@@ -12,7 +12,7 @@ use super::attribute;
 use super::measurement::{DIRECTIONS, FORMAT, LUMINANCE, RADIOMETRY, REFLECTANCE, TOLD, TRANSFER};
 use crate::disk::output::{self, Made};
 use crate::disk::temporary::Temporary;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::Existing;
 use crate::store::measurement::KIND;
 use crate::words::counted;
@@ -46,8 +46,8 @@ impl Writer {
     /// `recipe`. Remarks and assumptions of `contents` are not written.
     ///
     /// # Errors
-    /// [`crate::Kind::Usage`] for contents without views, lights, channels or texels; [`crate::Kind::Io`] where nothing can
-    /// be written, or for an attribute of more than 60 000 bytes.
+    /// [`crate::ErrorKind::Usage`] for contents without views, lights, channels or texels; [`crate::ErrorKind::Io`]
+    /// where nothing can be written, or for an attribute of more than 60 000 bytes.
     pub fn create(path: &Path, contents: &Contents, attributes: &Map<String, Value>) -> Result<Self> {
         let shape = [
             contents.views.len(),
@@ -150,7 +150,8 @@ impl Writer {
     /// none.
     ///
     /// # Errors
-    /// [`crate::Kind::Internal`] for samples of another type or number than the contents say; [`crate::Kind::Io`].
+    /// [`crate::ErrorKind::Internal`] for samples of another type or number than the contents say;
+    /// [`crate::ErrorKind::Io`].
     pub fn write_view(&mut self, view: usize, samples: &Samples, luminance: Option<&[u8]>) -> Result<()> {
         let [_, height, width, lights, channels] = self.shape;
         if let Some(codes) = luminance {
@@ -203,7 +204,7 @@ impl Writer {
     /// Completes the file and gives it its name.
     ///
     /// # Errors
-    /// [`crate::Kind::Internal`] where views are missing; [`crate::Kind::Io`].
+    /// [`crate::ErrorKind::Internal`] where views are missing; [`crate::ErrorKind::Io`].
     pub fn finish(mut self) -> Result<Made> {
         let counts = [&self.written[0], &self.written[1]].map(BTreeSet::len);
         let views = self.shape[0];
@@ -219,7 +220,7 @@ impl Writer {
         if let Some(file) = self.file.take() {
             file.flush().and_then(|()| file.close()).map_err(|error| cannot_write(&self.path, &error))?;
         }
-        output::settle(&self.temporary.path().join(FILE), &self.path, self.existing)
+        output::put_in_place(&self.temporary.path().join(FILE), &self.path, self.existing)
     }
 }
 
@@ -248,5 +249,5 @@ fn write_directions(file: &File, which: usize, directions: &[Direction]) -> hdf5
 }
 
 fn cannot_write(path: &Path, error: &hdf5::Error) -> Error {
-    Error::new(Kind::Io, format!("cannot write {}: {error}", path.display()))
+    Error::new(ErrorKind::Io, format!("cannot write {}: {error}", path.display()))
 }

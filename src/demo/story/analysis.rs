@@ -8,18 +8,18 @@ use crate::demo::story::{Block, Grid, Section, Table, per_direction, shot, text}
 pub(super) fn measured(settings: &Settings) -> Section {
     let lit = |light, view| Lit { view, light };
     let pairs = [
-        (Lit::REFERENCE, "Reference"),
-        (lit((75.0, 90.0), (0.0, 0.0)), "Grazing light from above"),
-        (lit((45.0, 180.0), (45.0, 0.0)), "Near the mirror direction"),
-        (lit((15.0, 0.0), (75.0, 270.0)), "Tilted view from below"),
+        (Lit::REFERENCE, "High light"),
+        (lit((75.0, 90.0), (0.0, 0.0)), "Grazing light from the top"),
+        (lit((45.0, 180.0), (45.0, 0.0)), "Light and view opposite, where highlights are"),
+        (lit((15.0, 0.0), (75.0, 270.0)), "Low view from the bottom"),
     ];
     let count = settings.directions * settings.directions;
     let intro = format!(
-        "<p>The archive holds {count} photographs of {size} texels: {n} lights for each of {n} views, \
-         rectified, in the layout of the Bonn UBO2003 sets. The material is rendered from a seeded height \
-         field with shadows, masking and gloss, so the demo needs no download; every later step reads the \
-         archive as it would a measured one. Directions are the polar angle θ from the surface normal and the \
-         azimuth φ, counter-clockwise from the right.</p>",
+        "<p>The archive holds {count} photographs of {size} texels: {n} views, each under {n} lights. All are \
+         rectified, so the same pixel always shows the same point of the material, which is called a texel. \
+         Here the photographs are rendered from a random relief, with shadows, masking and gloss, so that the \
+         demo needs no download. All later steps treat them as a real measurement. A direction is given by \
+         its angle θ from the surface normal and its azimuth φ, counter-clockwise from the right.</p>",
         size = settings.sample,
         n = settings.directions,
     );
@@ -39,11 +39,11 @@ pub(super) fn tile(figures: &Figures) -> Section {
     let report = &figures.tile;
     let [height, width] = report.size;
     let intro = format!(
-        "<p>A patch of {width} × {height} texels is cut so that its left border continues its right one and \
-         its top its bottom one. Texels are taken whole, from one side or the other of a minimum-error path, \
-         so the tile is a map of measured texels. The step across its seams is <b>{:.2}</b> times that \
-         between ordinary neighbours; repeated without the cut it is {:.2} (1 cannot be told from the \
-         material).</p>",
+        "<p>From the measurement a patch of {width} × {height} texels is cut so that it can be laid beside \
+         itself: its left border continues its right one, and its top its bottom. The cut follows the path \
+         where it shows least, and on either side of it whole measured texels are taken, never mixtures. \
+         Neighbours across the seams differ <b>{:.2}</b> times as much as neighbours elsewhere. Without the \
+         cut it would be {:.2} times; 1 would be invisible.</p>",
         report.seam_visibility, report.uncut_visibility
     );
     let shots = vec![
@@ -51,20 +51,20 @@ pub(super) fn tile(figures: &Figures) -> Section {
         shot(
             "tile-seams",
             Subject::Seams,
-            "<b>Its seams</b>: orange was taken from beyond the right border of the patch, blue from beyond \
-             the bottom one, violet from beyond both",
+            "<b>Its seams</b>: orange texels come from beyond the right border of the patch, blue ones from \
+             beyond the bottom, violet ones from beyond both",
             "The tile with the texels from beyond its borders tinted",
         ),
         shot(
             "patch-repeated",
             Subject::PatchRepeated,
-            "<b>The patch 3 × 3, not cut</b>: its borders show as straight lines",
+            "<b>The patch 3 × 3, without the cut</b>: its borders show as straight lines",
             "The uncut patch repeated three by three, with visible borders",
         ),
         shot(
             "tile-repeated",
             Subject::TileRepeated,
-            "<b>The tile 3 × 3</b>: it joins itself, but it repeats",
+            "<b>The tile 3 × 3</b>: no borders show, but one sees that it repeats",
             "The tile repeated three by three",
         ),
     ];
@@ -75,34 +75,33 @@ pub(super) fn clusters(figures: &Figures) -> Section {
     let report = &figures.cluster;
     let error = report.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
     let intro = format!(
-        "<p>The tile's texels are clustered by their whole reflectance, L* under all pairs of directions, \
-         views weighted by the cosine of their polar angle (equation (1)): <b>{} clusters</b> after {} passes, \
-         {} of a single texel. The objective, the mean weighted |ΔL*| of a texel, is <b>{error:.3}</b> from \
-         the centres and {:.3} from the representatives, the measured colour BRDFs that stand for the \
-         clusters.</p>",
+        "<p>Texels that look alike under all views and lights are put into one cluster: <b>{} clusters</b>, \
+         found in {} passes over the texels. Texels are compared by their lightness L* under all pairs of \
+         directions; grazing views count less. The mean difference of a texel from the centre of its cluster \
+         is <b>{error:.3}</b>, and from the measured texel that represents the cluster {:.3}. A difference of \
+         1 is just visible.</p>",
         report.clusters,
         report.passes.len(),
-        report.single_texel_clusters,
         report.representative_lightness_error
     );
     let shots = vec![
         shot(
             "clusters",
             Subject::Clusters,
-            "<b>Clusters</b> in false colours",
+            "<b>Clusters</b> in false colours, from blue for the darkest to yellow for the lightest",
             "Cluster of each texel of the tile in false colours",
         ),
         shot("tile-measured", Subject::Tile, "<b>Measured</b>", "The measured tile"),
         shot(
             "tile-modelled",
             Subject::Modelled,
-            "<b>By the model</b>: each texel shows its cluster's representative",
-            "The tile re-made from clusters and representatives",
+            "<b>By the model</b>: each texel shows the representative of its cluster",
+            "The tile reconstructed from clusters and representatives",
         ),
         shot(
             "tile-difference",
             Subject::Difference,
-            format!("<b>Difference</b>, {DIFFERENCE_GAIN} times, around mid grey"),
+            format!("<b>Their difference</b>, {DIFFERENCE_GAIN} times as strong; grey where there is none"),
             "Difference of model and measurement",
         ),
     ];
@@ -118,24 +117,25 @@ pub(super) fn clusters(figures: &Figures) -> Section {
     });
     let table = Table {
         caption: format!(
-            "The tile by the model against the measured tile, all lights (CIEDE2000 over {} texels)",
+            "Errors of the model over the tile under all lights (CIEDE2000 over {} texels)",
             figures.compare.colour_texels
         ),
-        head: vec!["View θ", "Views", "Mean |ΔL*|", "PSNR, dB", "CIEDE2000", "95 % of it"],
+        head: vec!["View θ", "Views", "Mean |ΔL*|", "PSNR, dB", "Mean CIEDE2000", "95 % are below"],
         rows: rows.collect(),
     };
     Section {
-        title: "Clusters and representatives",
+        title: "The clusters",
         blocks: vec![text(intro), Block::Pictures(Grid::Small, shots), Block::Table(table)],
     }
 }
 
 pub(super) fn normals(figures: &Figures) -> Section {
     let intro = format!(
-        "<p>Photometric stereo under the {} lights of the frontal view gives the tile's normal map. A \
-         pyramid of causal autoregressive fields ({}) is fitted to it, each level with the neighbourhood \
-         of highest evidence, and synthesises normals for a plane of any size. Their root mean square angle \
-         from the mean normal is {:.1}° in the tile and <b>{:.1}°</b> synthesised.</p>",
+        "<p>Only the paper's way to enlarge needs this step. The direction of the surface at each texel, its \
+         normal, is estimated from the pictures under the {} lights of the frontal view. A random field ({}) \
+         is fitted to these normals, from which normals for a surface of any size can be drawn. As a check: \
+         normals deviate from their mean by {:.1}° in the tile, and by <b>{:.1}°</b> where they are drawn \
+         (root mean square).</p>",
         figures.normals.lights, figures.field.mrf, figures.normals.spread_deg, figures.synthesised_spread_deg
     );
     let shots = vec![
@@ -148,9 +148,9 @@ pub(super) fn normals(figures: &Figures) -> Section {
         shot(
             "normals-synthesised",
             Subject::SynthesisedNormals,
-            "<b>Synthesised normals</b>, the first part of the plane at the same scale: a Gaussian field \
-             keeps second-order statistics, not shapes",
-            "Synthesised normal map in false colours",
+            "<b>Drawn from the random field</b>, at the same scale: how much normals vary is kept, and over \
+             which distances, but shapes are not",
+            "Normal map drawn from the random field, in false colours",
         ),
     ];
     let rows = figures.field.levels.iter().enumerate().map(|(number, level)| {
@@ -162,15 +162,15 @@ pub(super) fn normals(figures: &Figures) -> Section {
         ]
     });
     let table = Table {
-        caption: "Levels of the random field, 0 the finest".to_owned(),
-        head: vec!["Level", "Texels", "Neighbours η", "Spectral radius (stable below 1)"],
+        caption: "Levels of the random field; 0 is the finest".to_owned(),
+        head: vec!["Level", "Texels", "Neighbours", "Spectral radius (stable below 1)"],
         rows: rows.collect(),
     };
     let mut blocks = vec![text(intro), Block::Pictures(Grid::Small, shots), Block::Table(table)];
     for (number, level) in figures.field.levels.iter().enumerate() {
         if let Some(note) = &level.note {
-            blocks.push(text(format!("<p>Level {number}, to be stable: {note}.</p>")));
+            blocks.push(text(format!("<p>To keep level {number} stable: {note}.</p>")));
         }
     }
-    Section { title: "Normals and their synthesis", blocks }
+    Section { title: "Normals and the random field", blocks }
 }

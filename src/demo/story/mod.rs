@@ -1,4 +1,4 @@
-//! What the page tells, section by section: text, pictures and tables filled with the run's figures.
+//! What the page says, section by section: text, pictures and tables filled with the run's figures.
 
 mod analysis;
 mod result;
@@ -70,7 +70,7 @@ fn text(html: impl Into<String>) -> Block {
 /// The page's title.
 pub(super) fn title(settings: &Settings) -> String {
     let count = settings.directions * settings.directions;
-    format!("From {count} photographs of {} to any area of it", settings.material())
+    format!("From {count} photographs of {} to a surface of any size", settings.material())
 }
 
 /// The story of a run, but for its times.
@@ -117,11 +117,11 @@ pub(super) fn times(steps: &[Step]) -> Section {
     let row = |name: &str, seconds: f64| vec![name.to_owned(), format!("{seconds:.2}")];
     let rows = steps.iter().map(|step| row(&step.name, step.seconds)).chain([row("all", total)]);
     let table = Table {
-        caption: "Wall time of each step".to_owned(),
+        caption: "Time of each step".to_owned(),
         head: vec!["Step", "Seconds"],
         rows: rows.collect(),
     };
-    let note = "<p>On the machine that made this page. Steps that a run finds done keep the time of the run \
-                that did them.</p>";
-    Section { title: "Times", blocks: vec![text(note), Block::Table(table)] }
+    let note = "<p>Seconds on the machine that made this page. A step that was finished by an earlier run keeps \
+                the time of that run.</p>";
+    Section { title: "How long it took", blocks: vec![text(note), Block::Table(table)] }
 }

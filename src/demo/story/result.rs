@@ -9,40 +9,42 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
     let size = settings.enlarged;
     let [row, column] = figures.companion_origin;
     let intro = format!(
-        "<p>The same area, {size} texels, covered in four ways. The two repetitions show measured samples, the \
-         two enlargements show the model. The second tile has the borders of the first, and the region at \
-         row {row}, column {column} of the measurement as its interior, joined by minimum-error paths on all \
-         four sides (seam visibility {:.2}); which tile stands where is drawn by chance.</p>\
-         <p>The paper synthesises normals as a Gaussian random field and takes for each the cluster that fits its \
-         neighbours. Statistics are kept, shapes are not. The coherent rule, the default of <code>btf enlarge</code>, \
-         makes every texel a texel of the tile whose neighbours continue it as they do in the tile: shapes are kept, \
-         and nothing repeats as a whole.</p>",
+        "<p>The same area of {size} texels, covered in four ways. The first two lay measured tiles side by \
+         side. The other two show the model. The second tile has the borders of the first, so both join in any \
+         order. Its interior comes from another place of the measurement, at row {row} and column {column}. \
+         Neighbours across its seams differ {:.2} times as much as elsewhere. A random number decides which \
+         tile stands where.</p>\
+         <p>The <b>paper's method</b> draws normals from the random field and takes, for each of them, a cluster \
+         whose normals are near and which fits the neighbours chosen before. Statistics are kept, shapes are not. \
+         The <b>default method</b> of <code>btf enlarge</code>, the coherent rule, makes every texel of the surface \
+         a texel of the tile, and neighbours continue each other as they do in the tile. Shapes are kept, and \
+         there is no regular repeat.</p>",
         figures.companion_visibility
     );
     let shots = vec![
         shot(
             "one-tile",
             Subject::OneTile,
-            "<b>One tile</b> repeated",
-            "The plane covered by repeating one tile",
+            "<b>One tile</b>, repeated: it comes back in rows and columns",
+            "The surface covered by repeating one tile",
         ),
         shot(
             "two-tiles",
             Subject::TwoTiles,
-            "<b>Two tiles</b> placed by chance",
-            "The plane covered by two tiles placed by chance",
+            "<b>Two tiles</b>, placed at random: their common borders still come back",
+            "The surface covered by two tiles placed at random",
         ),
         shot(
             "enlarged-by-paper",
             Subject::ByPaper,
-            "<b>Enlarged by the paper's rule</b>",
-            "The plane covered by the index that the paper's rule makes",
+            "<b>Enlarged by the paper's method</b>: no repeat, but shapes are lost",
+            "The surface as the paper's method makes it",
         ),
         shot(
             "enlarged",
             Subject::ENLARGED,
-            "<b>Enlarged by the coherent rule</b>",
-            "The plane covered by the index that the coherent rule makes",
+            "<b>Enlarged by the default method</b>: shapes are kept, without a regular repeat",
+            "The surface as the default method makes it",
         ),
     ];
     let tiles = vec![
@@ -51,12 +53,12 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
         shot(
             "second-tile-interior",
             Subject::CompanionInterior,
-            "<b>Its interior</b>, tinted: beyond the paths it is the first tile",
+            "<b>Its interior</b>, tinted; the rest is the first tile",
             "The second tile with its own interior tinted",
         ),
     ];
     Section {
-        title: "Tiling against enlargement",
+        title: "Enlarging, and what is gained over tiles",
         blocks: vec![text(intro), Block::Pictures(Grid::Large, shots), Block::Pictures(Grid::Small, tiles)],
     }
 }
@@ -66,21 +68,21 @@ pub(super) fn lights(settings: &Settings) -> Section {
     let normal = (0.0, 0.0);
     let pairs = [
         (lit((0.0, 0.0), normal), "Frontal light"),
-        (lit((45.0, 100.0), normal), "Light from above"),
+        (lit((45.0, 100.0), normal), "Light from the top"),
         (lit((60.0, 180.0), normal), "Light from the left"),
-        (lit((75.0, 270.0), normal), "Grazing light from below"),
-        (lit((37.0, 53.0), normal), "A light that was not measured"),
-        (lit((45.0, 180.0), (60.0, 0.0)), "Another view, towards the light"),
+        (lit((75.0, 270.0), normal), "Grazing light from the bottom"),
+        (lit((37.0, 53.0), normal), "A light between the measured ones"),
+        (lit((45.0, 180.0), (60.0, 0.0)), "A low view, towards the light"),
     ];
     let intro = format!(
-        "<p>One enlarged index, {} texels, under other lights and from another view: each texel's value is \
-         looked up in the representative of its cluster (equation (27)), between measured directions mixed \
-         from the three nearest views and lights in linear light. Tilted views are shown rectified, as they \
-         were measured.</p>",
+        "<p>One surface of {} texels under six lights. Only the number of a cluster is stored for each texel, \
+         and the model knows how that cluster looks under every measured light and view. For directions in \
+         between, the three nearest views and lights are mixed. Pictures from low views are shown rectified, \
+         as photographs of the measurement are.</p>",
         settings.enlarged
     );
     Section {
-        title: "The enlarged material under other lights",
+        title: "The surface under other lights",
         blocks: vec![
             text(intro),
             Block::Pictures(
@@ -95,22 +97,23 @@ pub(super) fn likeness(figures: &Figures) -> Section {
     let [measured, modelled] = figures.greys;
     let (enlarged, by_paper) = (&figures.enlarged, &figures.by_paper);
     let intro = format!(
-        "<p>The shares of the clusters in the enlarged index overlap with those in the tile by <b>{:.0} %</b> with \
-         the coherent rule and by <b>{:.0} %</b> with the paper's (100 %: the same shares); {} and {} of the {} \
-         clusters are not used at all. Under the light of the comparison, the spread of the means of {BLOCK} × \
-         {BLOCK} squares is <b>{:.2}</b> and <b>{:.2}</b> times the tile's: above 1, a picture has patches or \
-         streaks that are larger than those of the material.</p>\
-         <p>The paper's rule (25) takes, of the candidates, the cluster nearest to those at left and above. Average \
-         clusters are near to all others, so they crowd out rare ones such as grooves and highlights, and a region \
-         that has begun goes on along the scan.</p>\
-         <p>What both share: the reflectance of each texel is measured, not made. What the coherent rule cannot do: \
-         show what the tile has not. Where pieces of the tile meet, a long structure may step aside; a larger tile \
-         has fewer such places.</p>",
+        "<p><b>Does every cluster keep its share?</b> In the tile, each cluster covers some share of the texels. \
+         The surface of the default method agrees with these shares to <b>{:.0} %</b>, that of the paper's method to \
+         <b>{:.0} %</b> (100 % would be equal shares). Of the {} clusters, the default method leaves {} unused, \
+         the paper's method {}.</p>\
+         <p><b>Are there patches that the material does not have?</b> Take the mean brightness of each square of \
+         {BLOCK} × {BLOCK} texels. It varies <b>{:.2}</b> times as much as in the tile with the default method, and \
+         <b>{:.2}</b> times with the paper's. Above 1, a surface has larger patches or streaks than the material.</p>\
+         <p>Why the paper's method makes them: of the candidates it takes the cluster that is nearest to those at \
+         the left and above. Average clusters are near to all others, so they crowd out rare ones such as grooves \
+         and highlights, and a patch that has begun goes on.</p>\
+         <p>What the default method cannot do: show anything that the tile does not have. Where pieces of the tile \
+         meet, a long line may step aside. A larger tile has fewer such places.</p>",
         100.0 * enlarged.histogram_overlap,
         100.0 * by_paper.histogram_overlap,
+        figures.cluster.clusters,
         enlarged.unused_clusters,
         by_paper.unused_clusters,
-        figures.cluster.clusters,
         enlarged.grey.block_spread / measured.block_spread,
         by_paper.grey.block_spread / measured.block_spread,
     );
@@ -123,16 +126,19 @@ pub(super) fn likeness(figures: &Figures) -> Section {
         ]
     };
     let table = Table {
-        caption: format!("Grey in display levels (0 to 255), {}", directions(Lit::REFERENCE)),
-        head: vec!["Picture", "Mean", "Spread", "Spread of the squares' means"],
+        caption: format!("Brightness in display levels, 0 to 255; {}", directions(Lit::REFERENCE)),
+        head: vec!["Picture", "Mean", "Standard deviation", "Standard deviation of the squares' means"],
         rows: vec![
             row("Tile, measured", measured),
             row("Tile, by the model", modelled),
-            row("Enlarged by the coherent rule", enlarged.grey),
-            row("Enlarged by the paper's rule", by_paper.grey),
+            row("Enlarged by the default method", enlarged.grey),
+            row("Enlarged by the paper's method", by_paper.grey),
         ],
     };
-    Section { title: "How near the result comes", blocks: vec![text(intro), Block::Table(table)] }
+    Section {
+        title: "How near the surface comes to the material",
+        blocks: vec![text(intro), Block::Table(table)],
+    }
 }
 
 pub(super) fn sizes(figures: &Figures) -> Section {
@@ -152,15 +158,15 @@ pub(super) fn sizes(figures: &Figures) -> Section {
     let (tile, enlarged) = ("representatives + tile index", "representatives + enlarged index");
     let whole = "the whole measurement, raw";
     let table = Table {
-        caption: "Compression, each ratio with its ledger".to_owned(),
-        head: vec!["Kept", "Bytes", "Counted against", "Bytes", "Ratio"],
+        caption: "Compression: what is kept, and what it is compared with".to_owned(),
+        head: vec!["Kept", "Bytes", "Compared with", "Bytes", "Ratio"],
         rows: vec![
             row(tile, with_tile_index, "the tile, raw".to_owned(), ledger.tile),
             row(tile, with_tile_index, whole.to_owned(), ledger.measurement),
             row(enlarged, with_enlarged_index, whole.to_owned(), ledger.measurement),
             row(enlarged, with_enlarged_index, "the enlarged BTF, raw".to_owned(), ledger.enlarged),
             row(
-                "the paper's ledger: index of 4 bytes a texel",
+                "as the paper counts: an index of 4 bytes a texel",
                 as_in_paper,
                 "ten tiles, raw".to_owned(),
                 10 * ledger.tile,
@@ -168,20 +174,20 @@ pub(super) fn sizes(figures: &Figures) -> Section {
         ],
     };
     let note = format!(
-        "<p>The same model gives every one of these ratios, so a ratio without its ledger says nothing. \
-         \"Raw\" is {} bytes a texel, all pairs of directions, 8-bit RGB. The paper's \"approximately \
-         1/200\" sets ten tiles of 2.4 GB in all (137 × 142 texels each, which would be 3.8 GB raw) against \
-         9.3 MB, which is its representatives with a 4-byte index of 1024 × 1024. Only the last row counts \
-         ours in that way.</p>",
+        "<p>One model gives all of these ratios, so a ratio means nothing unless it says what was counted. \
+         Raw means {} bytes a texel: 8-bit RGB under all pairs of directions. The paper states \
+         \"approximately 1/200\". It compares ten tiles of 2.4 GB in all (137 × 142 texels each, which would be \
+         3.8 GB raw) with 9.3 MB: representatives, and an index of 4 bytes a texel for 1024 × 1024 texels. Only \
+         the last row counts in that way.</p>",
         ledger.texel
     );
     let [archive, measurement, model, enlarged] = ledger.on_disk;
     let disk = Table {
-        caption: "On this disk".to_owned(),
+        caption: "Sizes on disk".to_owned(),
         head: vec!["File or folder", "Bytes"],
         rows: [
-            (format!("{} (JPEG)", names::ARCHIVE), archive),
-            (format!("{} (samples and L*, lossless)", names::MEASUREMENT), measurement),
+            (format!("{} (photographs, JPEG)", names::ARCHIVE), archive),
+            (format!("{} (samples and lightness, without loss)", names::MEASUREMENT), measurement),
             (format!("{} (all of the model)", names::MODEL), model),
             (format!("{} (index, and which texel of the tile each texel is)", names::ENLARGED), enlarged),
         ]
@@ -199,9 +205,9 @@ pub(super) fn commands(settings: &Settings) -> Section {
         [names::ARCHIVE, names::MEASUREMENT, names::MODEL, names::ENLARGED, names::BY_PAPER];
     let Settings { sample, directions, clusters, passes, tolerance, candidates, seed, .. } = *settings;
     let (material, size) = (settings.material(), settings.enlarged);
-    let intro = "<p>Typed in the demo's folder, these name the same steps with the same settings: what is \
-                 done is found done (only the first makes its archive anew). For an archive of your own, \
-                 leave out the first line and give its name to the second, in another folder.</p>";
+    let intro = "<p>These commands are the steps of this page with the same settings. In the demo's folder they \
+                 find everything done already. For an archive of your own, go to another folder, leave out the \
+                 first line, and put the archive's name into the second.</p>";
     let seed = format!("--seed {seed}");
     let directions = format!("--views {directions} --lights {directions}");
     let limits = format!("--passes {passes} --tolerance {tolerance}");
@@ -220,7 +226,7 @@ pub(super) fn commands(settings: &Settings) -> Section {
         format!("btf image {enlarged} --light 45,100 --view 0,0 --out enlarged.png"),
         format!("btf image {model} --what normals --out normals.png"),
     ];
-    Section { title: "The same by hand", blocks: vec![text(intro), Block::Commands(lines)] }
+    Section { title: "The commands", blocks: vec![text(intro), Block::Commands(lines)] }
 }
 
 /// Bytes with a decimal unit, as the paper counts.

@@ -44,6 +44,7 @@ mod avx2;
 mod avx512;
 
 pub use super::Kernel;
+use super::dispatch;
 
 /// Bytes to whose multiple groups are padded.
 pub const LANE_BYTES: usize = 64;
@@ -146,31 +147,11 @@ impl Kernel {
     }
 
     fn tile(self, points: [&[u8]; TILE], centres: [&[u8]; TILE]) -> [[u32; TILE]; TILE] {
-        match self {
-            Self::Plain => points.map(|point| plain(point, centres)),
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: a kernel is only ever constructed after its features were found.
-            Self::Avx2 => unsafe { avx2::tile(points, centres) },
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: as above.
-            Self::Avx512 => unsafe { avx512::tile(points, centres) },
-        }
+        dispatch!(self; points.map(|point| plain(point, centres)), avx2::tile(points, centres), avx512::tile(points, centres))
     }
 
     fn row<const C: usize>(self, point: &[u8], centres: [&[u8]; C]) -> [u32; C] {
-        match self {
-            Self::Plain => plain(point, centres),
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: a kernel is only ever constructed after its features were found.
-            Self::Avx2 => unsafe { avx2::row(point, centres) },
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            // SAFETY: as above.
-            Self::Avx512 => unsafe { avx512::row(point, centres) },
-        }
+        dispatch!(self; plain(point, centres), avx2::row(point, centres), avx512::row(point, centres))
     }
 }
 

@@ -8,7 +8,7 @@ mod above;
 mod along;
 mod lanes;
 
-use super::{Kernel, compiled_for_each_kernel};
+use super::{Kernel, compiled_for_each_kernel, dispatch};
 use above::Above;
 use along::Along;
 use lanes::{LANES, Lanes};
@@ -263,17 +263,12 @@ fn make_avx512(above: &Above, along: &Along, work: Work<'_>) {
 }
 
 fn make(kernel: Kernel, above: &Above, along: &Along, work: Work<'_>) {
-    match kernel {
-        Kernel::Plain => make_with::<[f32; LANES]>(above, along, work),
-        #[cfg(target_arch = "x86_64")]
-        #[allow(unsafe_code)]
-        // SAFETY: a kernel is only ever constructed after its features were found.
-        Kernel::Avx2 => unsafe { make_avx2(above, along, work) },
-        #[cfg(target_arch = "x86_64")]
-        #[allow(unsafe_code)]
-        // SAFETY: as above.
-        Kernel::Avx512 => unsafe { make_avx512(above, along, work) },
-    }
+    dispatch!(
+        kernel;
+        make_with::<[f32; LANES]>(above, along, work),
+        make_avx2(above, along, work),
+        make_avx512(above, along, work),
+    )
 }
 
 #[inline(always)]

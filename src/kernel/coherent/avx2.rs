@@ -5,19 +5,13 @@ use std::arch::x86_64::*;
 
 use super::lanes::Lanes;
 use super::{Subpass, correct_by};
-use crate::kernel::Kernel;
 
 struct Avx2;
 
-/// Corrects positions; `kernel` vouches for the instructions.
-pub(super) fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
-    debug_assert!(kernel != Kernel::Plain);
-    #[target_feature(enable = "avx2")]
-    fn run<const D: usize>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
-        correct_by::<D, Avx2>(positions, subpass);
-    }
-    // SAFETY: a kernel other than the plain one is only ever constructed after AVX2 was found.
-    unsafe { run(positions, subpass) }
+/// Corrects positions.
+#[target_feature(enable = "avx2")]
+pub(super) fn correct<const D: usize>(positions: &mut [u32], subpass: &Subpass<'_, D>) {
+    correct_by::<D, Avx2>(positions, subpass);
 }
 
 // Methods of a trait cannot name the instructions that they need; they are inlined into the one above, which does.

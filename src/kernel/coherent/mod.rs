@@ -7,7 +7,7 @@ mod lanes;
 
 use lanes::{Lanes, Plain};
 
-use super::Kernel;
+use super::{Kernel, dispatch};
 
 /// A position in the exemplar as one word: row in the high half, column in the low one, each below 2^15.
 #[inline]
@@ -66,11 +66,12 @@ const SITES: usize = 12;
 
 /// Corrects positions at a level of `D` dimensions, a multiple of four.
 pub fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
-    match kernel {
-        Kernel::Plain => correct_by::<D, Plain>(positions, subpass),
-        #[cfg(target_arch = "x86_64")]
-        _ => avx2::correct(kernel, positions, subpass),
-    }
+    dispatch!(
+        kernel;
+        correct_by::<D, Plain>(positions, subpass),
+        avx2::correct(positions, subpass),
+        avx2::correct(positions, subpass),
+    );
 }
 
 /// Texels of a row that are looked at together.

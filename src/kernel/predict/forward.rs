@@ -107,7 +107,7 @@ pub(super) fn share<T: Lane>(weight: Weight, a: T, b: T) -> T {
     }
 }
 
-/// Takes from the residuals of one row in `out` what the lights around them foretell; `residual` has
+/// Takes from the residuals of one row in `out` what the lights around them predict; `residual` has
 /// [`SLACK`] before and after it.
 #[inline(always)]
 fn lift<T: Lane>(residual: &[T], out: &mut [T], level: usize, weight: Weight, mask: &[T]) {

@@ -12,7 +12,7 @@ pub(super) struct Scratch<T> {
     lower: Vec<T>,
 }
 
-/// Adds to the residuals of a row what the lights around them foretell, as the encoder took it away.
+/// Adds to the residuals of a row what the lights around them predict, as the encoder took it away.
 ///
 /// Reads one buffer and writes another: the bytes just written are not yet where a shifted read finds them fast.
 #[inline(always)]

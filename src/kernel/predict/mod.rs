@@ -1,8 +1,8 @@
 //! Lossless prediction of the samples of a chunk: what is left packs to a half or a quarter.
 //!
 //! A chunk is [y, x, light, channel]. Each channel becomes its difference from another ([`split`](Kernel::split)),
-//! each sample its difference from what its neighbours in the plane of its light foretell, and that residual its
-//! difference from what the residuals of neighbouring lights foretell ([`mode`]). All arithmetic is on whole
+//! each sample its difference from what its neighbours in the plane of its light predict, and that residual its
+//! difference from what the residuals of neighbouring lights predict ([`mode`]). All arithmetic is on whole
 //! numbers modulo 2^bits, so every kernel gives the same bytes. `docs/reference/codec.md` has it step by step.
 
 mod channels;
@@ -13,6 +13,7 @@ mod lane;
 pub mod mode;
 
 pub use super::Kernel;
+use super::dispatch;
 use channels::{join, split};
 pub use lane::Lane;
 use mode::{DISTANCES, Mode};
@@ -160,17 +161,12 @@ impl<T: Lane> Deltas<T> {
 macro_rules! kernels {
     ($(fn $name:ident = $plain:path; ($($argument:ident: $type:ty),*) $(-> $result:ty)?;)*) => {
         impl Kernel {$(
-            #[allow(unsafe_code)]
             fn $name<T: Lane>(self, $($argument: $type),*) $(-> $result)? {
                 #[cfg(target_arch = "x86_64")]
                 #[target_feature(enable = "avx2")]
                 fn avx2<T: Lane>($($argument: $type),*) $(-> $result)? { $plain($($argument),*) }
-                match self {
-                    Self::Plain => $plain($($argument),*),
-                    #[cfg(target_arch = "x86_64")]
-                    // SAFETY: these are only ever constructed after the feature was found. (AVX-512 gains nothing.)
-                    Self::Avx2 | Self::Avx512 => unsafe { avx2($($argument),*) },
-                }
+                // AVX-512 gains nothing.
+                dispatch!(self; $plain($($argument),*), avx2($($argument),*), avx2($($argument),*))
             }
         )*}
     };

@@ -12,7 +12,7 @@
 //! Keys that differ by at least `2 << SLOT_BITS` come from bits that differ by more than `1 << SLOT_BITS` = 64. Where
 //! two of the keys that follow each other in the result are nearer than that, the query is ranked again in f64.
 
-use super::Kernel;
+use super::{Kernel, dispatch};
 
 #[cfg(target_arch = "x86_64")]
 #[macro_use]
@@ -125,16 +125,12 @@ impl Kernel {
         queries: &[[f32; 3]; BATCH],
         found: &mut [[u32; RANKS]; BATCH],
     ) {
-        #[allow(unsafe_code)]
-        let mut doubtful = match self {
-            Self::Plain => (1 << BATCH) - 1,
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: a kernel is only ever constructed after its features were found.
-            Self::Avx2 => unsafe { avx2::rank(candidates, queries, found) },
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: as above.
-            Self::Avx512 => unsafe { avx512::rank(candidates, queries, found) },
-        };
+        let mut doubtful = dispatch!(
+            self;
+            (1 << BATCH) - 1,
+            avx2::rank(candidates, queries, found),
+            avx512::rank(candidates, queries, found),
+        );
         while doubtful != 0 {
             let query = doubtful.trailing_zeros() as usize;
             candidates[query].rank(queries[query], &mut found[query]);

@@ -33,8 +33,8 @@ pub(super) fn stays(
 ) -> (Vec<bool>, u64) {
     let Size { height, width } = size;
     // A place from how far along a side it is, and how far from it.
-    type Place = fn(Size, usize, usize) -> [usize; 2];
-    let sides: [(usize, usize, Place); 4] = [
+    type TexelOf = fn(Size, usize, usize) -> [usize; 2];
+    let sides: [(usize, usize, TexelOf); 4] = [
         (shared.top, width, |_, along, inwards| [inwards, along]),
         (shared.bottom, width, |size, along, inwards| [size.height - 1 - inwards, along]),
         (shared.left, height, |_, along, inwards| [along, inwards]),

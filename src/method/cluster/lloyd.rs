@@ -14,7 +14,7 @@ use crate::kernel::Kernel;
 use crate::run::Context;
 
 /// When to stop.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Most passes.
     pub passes: usize,
@@ -56,7 +56,7 @@ impl Pass {
 }
 
 /// Tells the last pass beside the bar, and how many may follow; `each` is the time that one takes, where it is known.
-pub fn tell(passes: &[Pass], limits: Limits, each: Option<Duration>, context: &Context<'_>) {
+pub fn announce(passes: &[Pass], limits: Limits, each: Option<Duration>, context: &Context<'_>) {
     let Some(Pass { mean_lightness_error, moved, .. }) = passes.last() else { return };
     let (number, left) = (passes.len(), limits.passes_left(passes));
     let time = each.map_or(String::new(), |each| format!(", {:.0} s", each.as_secs_f64() * left as f64));
@@ -69,12 +69,12 @@ impl Limits {
     /// Whether these passes are enough: the last one found no cluster empty, and it moved nothing or gained
     /// too little; or there are as many as allowed.
     pub fn reached(&self, passes: &[Pass]) -> bool {
-        let settled = passes.last().is_some_and(|last| {
+        let converged = passes.last().is_some_and(|last| {
             let before = passes.len().checked_sub(2).map_or(u64::MAX, |before| passes[before].objective);
             let gain = (before as f64 - last.objective as f64) / (before as f64).max(1.0);
             last.reseeded == 0 && (last.moved == 0 || gain < self.tolerance)
         });
-        settled || passes.len() >= self.passes
+        converged || passes.len() >= self.passes
     }
 
     /// How many passes may follow: gains are taken to go on shrinking as the last two did.
@@ -175,7 +175,7 @@ pub fn run(points: &Points, first: Vec<u8>, method: Method, context: &Context<'_
         };
         let reseeded = empty.len().min(farthest.texels().len());
         passes.push(Pass::new(arrangement, points.len(), distances.iter().sum(), moved, reseeded));
-        tell(&passes, method.limits, None, context);
+        announce(&passes, method.limits, None, context);
         if method.is_done(&passes) {
             return Ok(Clustering { centres, index, nearest, passes });
         }

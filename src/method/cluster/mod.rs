@@ -4,6 +4,7 @@
 pub mod assign;
 pub mod bounds;
 pub mod centre;
+pub mod choice;
 pub mod lloyd;
 pub mod nearest;
 pub mod points;

@@ -10,7 +10,7 @@ use crate::random::Hash;
 use crate::shape::{Size, Window};
 
 /// Most texels of a block.
-const BLOCK_TEXELS: usize = 4096;
+pub const BLOCK_TEXELS: usize = 4096;
 
 /// Parts are about this many, and so are blocks of drawn chunks at least.
 const PARTS: usize = 16;

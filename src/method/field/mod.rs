@@ -20,7 +20,7 @@ pub mod surface;
 pub mod synthesis;
 
 pub use fit::fit;
-pub use model::{Gains, Kind, Level, Model, Options};
+pub use model::{CarKind, Gains, Level, Model, Options};
 pub use raster::{Boundary, Field};
 pub use surface::{Coordinates, Surface};
 pub use synthesis::{Extent, Synthesis};

@@ -18,7 +18,7 @@ const ORTHONORMAL_TOLERANCE: f64 = 1e-6;
 
 /// Whether the channels are modelled together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
+pub enum CarKind {
     /// 3D CAR, (9): all channels at once.
     #[serde(rename = "3d")]
     Car3d,
@@ -27,7 +27,7 @@ pub enum Kind {
     Car2d,
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for CarKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Car3d => "3D CAR",
@@ -50,7 +50,7 @@ pub enum Gains {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Channels together or one by one.
-    pub kind: Kind,
+    pub kind: CarKind,
     /// Pyramid levels; `None` chooses by autocovariance among all numbers that keep ten samples per parameter at the
     /// coarsest for four neighbours, at least 1 and at most 5.
     pub levels: Option<usize>,
@@ -65,7 +65,7 @@ pub struct Options {
 #[derive(Clone, Debug)]
 pub struct Model {
     /// Which equations hold.
-    pub kind: Kind,
+    pub kind: CarKind,
     /// Mean of each channel of the data.
     pub mean: Vec<f64>,
     /// T of (15), `[channels, channels]`, rows the eigenvectors; 2D only.
@@ -126,8 +126,8 @@ impl Model {
         }
         check_covariance(&self.covariance).map_err(|error| error.context("covariance"))?;
         match (self.kind, &self.transform) {
-            (Kind::Car3d, None) => {}
-            (Kind::Car2d, Some(t)) if t.shape() == (channels, channels) => {
+            (CarKind::Car3d, None) => {}
+            (CarKind::Car2d, Some(t)) if t.shape() == (channels, channels) => {
                 let off = (t * t.transpose() - DMatrix::identity(channels, channels)).map(f64::abs);
                 if !off.iter().all(|&entry| entry <= ORTHONORMAL_TOLERANCE) {
                     return Err(Error::input(
@@ -135,10 +135,10 @@ impl Model {
                     ));
                 }
             }
-            (Kind::Car3d, Some(_)) => {
+            (CarKind::Car3d, Some(_)) => {
                 return Err(Error::input("a 3D field model has no Karhunen-Loeve transformation"));
             }
-            (Kind::Car2d, _) => {
+            (CarKind::Car2d, _) => {
                 return Err(Error::input(format!(
                     "a 2D field model of {channels} channels needs a {channels} x {channels} transformation"
                 )));
@@ -168,9 +168,9 @@ impl Level {
 
     /// Gamma `[channels, channels * sites]` and Sigma `[channels, channels]` of all channels together, at the level's
     /// gain. Scalar models become diagonal blocks, so what reads these need not know the kind.
-    pub(super) fn joint(&self, kind: Kind) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(super) fn joint(&self, kind: CarKind) -> (DMatrix<f64>, DMatrix<f64>) {
         let sigma = self.noise_covariance();
-        if kind == Kind::Car3d {
+        if kind == CarKind::Car3d {
             return (self.gamma.clone(), sigma);
         }
         let (channels, sites) = self.gamma.shape();
@@ -184,15 +184,15 @@ impl Level {
     }
 
     /// The spectral radius of the field, of its worst channel if 2D.
-    pub(super) fn measure_radius(&self, kind: Kind) -> Result<f64> {
+    pub(super) fn measure_radius(&self, kind: CarKind) -> Result<f64> {
         stability::radius(&self.joint(kind).0, &self.neighbourhood)
     }
 
-    fn check(&self, kind: Kind, channels: usize) -> Result<()> {
+    fn check(&self, kind: CarKind, channels: usize) -> Result<()> {
         let sites = self.neighbourhood.len();
         let (gamma, sigma) = match kind {
-            Kind::Car3d => ((channels, channels * sites), (channels, channels)),
-            Kind::Car2d => ((channels, sites), (channels, 1)),
+            CarKind::Car3d => ((channels, channels * sites), (channels, channels)),
+            CarKind::Car2d => ((channels, sites), (channels, 1)),
         };
         for (name, matrix, shape) in [("gamma", &self.gamma, gamma), ("sigma", &self.sigma, sigma)] {
             if matrix.shape() != shape {
@@ -230,12 +230,12 @@ pub(super) mod tests {
 
     /// A model of one level from coefficients as they are stored.
     pub(in crate::method::field) fn single(
-        kind: Kind,
+        kind: CarKind,
         sites: &[[i32; 2]],
         gamma: &[f64],
         sigma: &[f64],
     ) -> Model {
-        let channels = if kind == Kind::Car3d { sigma.len().isqrt() } else { sigma.len() };
+        let channels = if kind == CarKind::Car3d { sigma.len().isqrt() } else { sigma.len() };
         let level = Level {
             neighbourhood: sites.to_vec(),
             gamma: DMatrix::from_row_slice(channels, gamma.len() / channels, gamma),
@@ -247,7 +247,7 @@ pub(super) mod tests {
             size: [64, 64],
             note: None,
         };
-        let transform = (kind == Kind::Car2d).then(|| DMatrix::identity(channels, channels));
+        let transform = (kind == CarKind::Car2d).then(|| DMatrix::identity(channels, channels));
         let covariance = DMatrix::identity(channels, channels);
         let mean = vec![0.0; channels];
         Model { kind, mean, transform, levels: vec![level], covariance, autocovariance_error: 0.0 }
@@ -255,7 +255,7 @@ pub(super) mod tests {
 
     #[test]
     fn scalar_models_become_diagonal_blocks() {
-        let model = single(Kind::Car2d, &[[0, 1], [1, 0]], &[0.1, 0.2, 0.3, 0.4], &[5.0, 6.0]);
+        let model = single(CarKind::Car2d, &[[0, 1], [1, 0]], &[0.1, 0.2, 0.3, 0.4], &[5.0, 6.0]);
         let (gamma, sigma) = model.levels[0].joint(model.kind);
         assert_eq!(gamma, DMatrix::from_row_slice(2, 4, &[0.1, 0.0, 0.2, 0.0, 0.0, 0.3, 0.0, 0.4]));
         assert_eq!(sigma, DMatrix::from_row_slice(2, 2, &[5.0, 0.0, 0.0, 6.0]));
@@ -264,7 +264,7 @@ pub(super) mod tests {
 
     #[test]
     fn damaged_models_are_refused() {
-        let sound = single(Kind::Car3d, &[[0, 1]], &[0.5, 0.1, 0.0, 0.5], &[1.0, 0.3, 0.3, 1.0]);
+        let sound = single(CarKind::Car3d, &[[0, 1]], &[0.5, 0.1, 0.0, 0.5], &[1.0, 0.3, 0.3, 1.0]);
         sound.check().unwrap();
         let damages: [fn(&mut Model); 11] = [
             |m| m.levels.clear(),
@@ -272,7 +272,7 @@ pub(super) mod tests {
             |m| m.covariance = DMatrix::identity(3, 3),
             |m| m.mean[0] = f64::INFINITY,
             |m| m.transform = Some(DMatrix::identity(2, 2)),
-            |m| m.kind = Kind::Car2d,
+            |m| m.kind = CarKind::Car2d,
             |m| m.levels[0].gamma[(0, 0)] = f64::NAN,
             |m| m.levels[0].gamma[(0, 0)] = 1.01,
             |m| m.levels[0].sigma[(1, 0)] = 1.5,
@@ -284,7 +284,7 @@ pub(super) mod tests {
             damage(&mut model);
             assert!(model.check().is_err(), "damage {n}");
         }
-        let mut skewed = single(Kind::Car2d, &[[0, 1]], &[0.5, 0.5], &[1.0, 1.0]);
+        let mut skewed = single(CarKind::Car2d, &[[0, 1]], &[0.5, 0.5], &[1.0, 1.0]);
         skewed.transform = Some(DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 1.0]));
         assert!(skewed.check().is_err());
     }

@@ -77,7 +77,8 @@ impl Surface {
         Ok(Self { coordinates, field, marginals })
     }
 
-    /// The unit normals of the next rows of a synthesis of the field, `[row][width]`: as many rows as there is room for.
+    /// The unit normals of the next rows of a synthesis of the field, `[row][width]`: as many rows as there is room
+    /// for.
     ///
     /// # Errors
     /// Those of [`Synthesis::next_row`].
@@ -116,7 +117,7 @@ fn unit([x, y, z]: [f32; 3]) -> [f32; 3] {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::method::field::{Boundary, Gains, Kind};
+    use crate::method::field::{Boundary, CarKind, Gains};
     use crate::random::Hash;
 
     const SIZE: Size = Size { height: 48, width: 40 };
@@ -134,7 +135,7 @@ mod tests {
 
     fn fitted(coordinates: Coordinates, matching: Option<Matching>) -> Surface {
         let options = Options {
-            kind: Kind::Car3d,
+            kind: CarKind::Car3d,
             levels: Some(1),
             gains: Gains::Matched,
             boundary: Boundary::Periodic,

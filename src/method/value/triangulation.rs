@@ -83,6 +83,19 @@ impl Interpolator {
         }
     }
 
+    /// The direction that is shown instead of one that lies outside of all triangles; none where that one is mixed of
+    /// what was measured around it.
+    pub fn shown_instead(&self, direction: Direction) -> Option<Direction> {
+        /// Nearer than this, cosine of half a degree, it is the same for the eye.
+        const NEAR: f64 = 0.999_962;
+        let mut shown = [0.0; 3];
+        for (number, weight) in self.mix(direction).terms {
+            shown = std::array::from_fn(|axis| shown[axis] + weight * self.vectors[number][axis]);
+        }
+        let cosine = dot(shown, direction.vector()) / dot(shown, shown).sqrt();
+        if cosine > NEAR { None } else { Direction::from_vector(shown) }
+    }
+
     fn nearest(&self, target: [f64; 3]) -> usize {
         let mut best = 0;
         for number in 1..self.vectors.len() {
@@ -226,6 +239,28 @@ mod tests {
         assert!((mix.cosine_ratio - expected).abs() < 1e-9);
         let between = interpolator.mix(Direction::from_degrees(80.0, 22.5));
         assert!(between.terms.len() == 2 && between.terms.iter().all(|(_, w)| (w - 0.5).abs() < 1e-9));
+    }
+
+    #[test]
+    fn what_is_shown_instead_is_told_only_outside_of_what_was_measured() {
+        let directions = bonn();
+        let interpolator = Interpolator::new(&directions, &triangulate(&directions));
+        for (theta, phi) in [(0.0, 0.0), (33.0, 100.0), (75.0, 15.0), (74.0, 200.0)] {
+            assert_eq!(
+                interpolator.shown_instead(Direction::from_degrees(theta, phi)),
+                None,
+                "{theta} {phi}"
+            );
+        }
+        let shown = |interpolator: &Interpolator, theta, phi| {
+            let shown = interpolator.shown_instead(Direction::from_degrees(theta, phi));
+            shown.map(|shown| (shown.degrees().0.round(), shown.degrees().1.round()))
+        };
+        assert_eq!(shown(&interpolator, 85.0, 15.0), Some((75.0, 15.0)));
+        let one = [Direction::from_degrees(30.0, 0.0)];
+        let alone = Interpolator::new(&one, &triangulate(&one));
+        assert_eq!(shown(&alone, 60.0, 180.0), Some((30.0, 0.0)));
+        assert_eq!(shown(&alone, 30.0, 360.0), None);
     }
 
     #[test]

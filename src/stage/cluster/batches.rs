@@ -8,10 +8,9 @@
 
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::{Error, Result};
 use crate::method::cluster::bounds::Centres;
+use crate::method::cluster::choice::First;
 use crate::method::cluster::lloyd::Pass;
 use crate::stage::cluster::Plan;
 use crate::store::clustering::{Found, History};
@@ -19,16 +18,6 @@ use crate::store::clustering::{Found, History};
 /// Texels of the first batch for each of its sample. Texels of one chunk are alike, so that first centres from whole
 /// chunks miss what few chunks have.
 const SPREAD: usize = 8;
-
-/// Where the first centres of the passes over all texels come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum First {
-    /// A sample without preference that fits in memory.
-    Sample,
-    /// Mini-batches that grow, from a sample of the first.
-    Minibatch,
-}
 
 impl Plan {
     /// The first mini-batch; `None` where that is all texels, as it is without mini-batches.

@@ -1,11 +1,16 @@
 //! What memory allows: how many bounds a texel has and how many blocks are kept.
 
 use crate::error::Result;
+use crate::method::cluster::centre::CentreRule;
+use crate::method::cluster::points::Arrangement;
 use crate::method::cluster::seeding;
+use crate::method::cluster::selection::BLOCK_TEXELS;
 use crate::method::cluster::tally::Tally;
 use crate::run::Context;
+use crate::run::read_ahead::IN_FLIGHT;
 use crate::stage::cluster::stream::Stream;
-use crate::stage::cluster::{Amount, First, Plan};
+use crate::stage::cluster::{Amount, First, MOST_CLUSTERS, Options, Plan, USUAL_CLUSTERS, clusters_of_ratio};
+use crate::store::measurement::Description;
 use crate::words::counted;
 
 /// The program itself, and what allocators keep.
@@ -98,7 +103,7 @@ impl Budget {
     }
 
     /// The same for as many clusters as are asked for, or as a search may go up to within memory.
-    pub(super) fn of_first_approach(plan: &Plan, context: &Context<'_>) -> Result<Self> {
+    pub(super) fn of_initial(plan: &Plan, context: &Context<'_>) -> Result<Self> {
         let mut clusters = plan.most_clusters;
         if let Amount::Error(_) = plan.options.amount {
             while clusters > 1 && Self::least(plan, clusters, context.threads) as u64 > context.memory_bytes {
@@ -109,6 +114,44 @@ impl Budget {
     }
 }
 
+/// What the needs depend on.
+struct Sizes {
+    texels: usize,
+    sample: usize,
+    clusters: usize,
+    /// Bytes of a texel's vector.
+    stride: usize,
+    /// Bytes of blocks that are read ahead.
+    flight: usize,
+    centre: CentreRule,
+    threads: usize,
+}
+
+/// Memory that is enough to cluster any tile of at most so many texels of a measurement, before there is one.
+pub(crate) fn enough_bytes(
+    options: &Options,
+    description: &Description,
+    texels: usize,
+    threads: usize,
+) -> u64 {
+    let arrangement = Arrangement::new(&description.views, description.lights.len());
+    let stride = arrangement.stride();
+    let brdf = description.bytes() / description.size.texels().max(1) as u64;
+    let clusters = match options.amount {
+        Amount::Usual => USUAL_CLUSTERS,
+        Amount::Clusters(clusters) => clusters,
+        Amount::Ratio(ratio) => clusters_of_ratio(description.bytes(), brdf, 0, ratio),
+        // A search goes up to what memory allows.
+        Amount::Error(_) => 1,
+    };
+    let clusters = clusters.clamp(1, texels.clamp(1, MOST_CLUSTERS));
+    let sample = options.sample.unwrap_or(SAMPLE_BYTES / stride).max(clusters).min(texels);
+    let flight = BLOCK_TEXELS * (IN_FLIGHT * stride + arrangement.cosines().len() * arrangement.lights());
+    let centre = options.centre;
+    let needs = Needs::of(&Sizes { texels, sample, clusters, stride, flight, centre, threads });
+    needs.map(|needs| needs.fixed + needs.texels * size_of::<u16>()).into_iter().max().unwrap_or(0) as u64
+}
+
 /// Bytes that a phase takes beside bounds and kept blocks, and the texels that bounds are for.
 struct Needs {
     fixed: usize,
@@ -116,18 +159,27 @@ struct Needs {
 }
 
 impl Needs {
-    /// Those of the first approach and of a pass over all texels.
     fn both(plan: &Plan, clusters: usize, threads: usize) -> [Self; 2] {
-        let stride = plan.arrangement.stride();
+        Self::of(&Sizes {
+            texels: plan.selection.texels(),
+            sample: plan.sample_texels(),
+            clusters,
+            stride: plan.arrangement.stride(),
+            flight: Stream::bytes_in_flight(&plan.selection, &plan.arrangement),
+            centre: plan.options.centre,
+            threads,
+        })
+    }
+
+    /// Those of the first approach and of a pass over all texels.
+    fn of(sizes: &Sizes) -> [Self; 2] {
+        let &Sizes { texels, sample, clusters, stride, flight, centre, threads } = sizes;
         // Sources, places, numbers, index now and before, distances.
-        let texels = plan.selection.texels();
         let listed = texels * (8 + 4 + 4 + 2 + 2);
         let tables = threads * clusters * (TABLE_TEXELS * size_of::<u64>() + 16);
         let between = clusters * clusters * (size_of::<u64>() + size_of::<u16>());
-        let flight = Stream::bytes_in_flight(&plan.selection, &plan.arrangement);
         let common = PROGRAM_BYTES + listed + tables + between + 4 * clusters * stride;
-        let sample = plan.sample_texels();
-        let tally = Tally::bytes(plan.options.centre, clusters, stride);
+        let tally = Tally::bytes(centre, clusters, stride);
         [
             Self { fixed: common + sample * (stride + 40) + flight, texels: sample },
             Self { fixed: common + flight + tally, texels },

@@ -1,14 +1,14 @@
 //! Tile to clusters: index, centres, representatives and their distances.
 //!
-//! Few texels are clustered in memory. Of more, a sample is ([`approach`]), and from its centres go passes over growing
+//! Few texels are clustered in memory. Of more, a sample is ([`initial`]), and from its centres go passes over growing
 //! mini-batches ([`batches`]) and all texels ([`pass`]) that read each chunk once. What memory allows never changes a
 //! result: it only says how many bounds and blocks are kept.
 
-mod approach;
 mod batches;
 mod budget;
 pub mod curve;
 mod finish;
+mod initial;
 mod pass;
 mod stream;
 mod taken;
@@ -17,30 +17,31 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::cluster::centre::CentreRule;
+pub use crate::method::cluster::choice::{Amount, First};
 use crate::method::cluster::lloyd::{Limits, Method, Pass};
 use crate::method::cluster::points::Arrangement;
-use crate::method::cluster::search::Trial;
 use crate::method::cluster::selection::{Order, Selection};
 use crate::method::tile::Tile;
 use crate::names::with_ending;
-use crate::run::{Context, recipe};
+use crate::run::Context;
+use crate::run::recipe::{self, Recipe};
 use crate::stage::import::Shard;
-use crate::store::clustering::{BatchPass, Passes, State};
+use crate::store::clustering::{Passes, State};
 use crate::store::measurement::Measurement;
+use crate::store::model::clusters::ClusterRecipe;
+pub use crate::store::model::clusters::{ClusterReport as Report, Ended};
+use crate::store::model::tile::TileRecipe;
 use crate::store::model::{Model, Stage};
+use crate::store::origin;
 use crate::words::counted;
-pub use batches::First;
+pub(crate) use budget::enough_bytes;
 use pass::{Next, Work};
 pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
-
-/// Version of this stage's method, part of its recipe: raised when a change makes other bytes.
-const METHOD: u64 = 2;
 
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;
@@ -53,20 +54,6 @@ const MOST_SEARCHED: usize = 4096;
 
 /// The folder in a model that holds the passes of a clustering on its way.
 const PASSES: &str = "clustering";
-
-/// How many clusters.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Amount {
-    /// 256, or as many as there are texels where those are fewer. Recipes have the number.
-    Usual,
-    /// This many, n_c.
-    Clusters(usize),
-    /// The fewest whose weighted mean |dL*| from the centres is at most this.
-    Error(f64),
-    /// The most that leave representatives and index this many times smaller than the raw measurement.
-    Ratio(f64),
-}
 
 /// How to cluster.
 #[derive(Clone, Debug)]
@@ -116,7 +103,7 @@ impl Options {
 /// A step of a clustering that many processes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// The first approach, by one process.
+    /// The initial clustering, by one process.
     Prepare,
     /// One process's share of a pass; the latest where none is named.
     Assign(Option<usize>, Shard),
@@ -144,60 +131,10 @@ pub enum Stepped {
     Over(usize),
 }
 
-/// How a clustering went.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Report {
-    /// Clusters, fewer than asked for where there are fewer distinct BRDFs.
-    pub clusters: usize,
-    /// What each pass over all texels found; the last one's objective is the result's.
-    pub passes: Vec<Pass>,
-    /// Why there was no further pass.
-    pub ended: Ended,
-    /// Passes over mini-batches that grew, before these.
-    #[serde(default)]
-    pub batches: Vec<BatchPass>,
-    /// Texels of the sample that the first approach was made on; 0 where all texels went into memory.
-    pub sample_texels: usize,
-    /// Passes over the sample.
-    pub sample_passes: Vec<Pass>,
-    /// What other numbers of clusters left, where one was searched: of the sample, then of all texels.
-    pub trials: Vec<Trial>,
-    /// Mean weighted |dL*| of texels from the representatives of their clusters.
-    pub representative_lightness_error: f64,
-    /// Mean weighted |dL*| of representatives from their centres.
-    pub representative_from_centre: f64,
-    /// The largest of these.
-    pub representative_from_centre_most: f64,
-    /// Clusters of a single texel.
-    pub single_texel_clusters: usize,
-    /// The model that the clusters were taken from, where they were: its name and the texels that it clustered.
-    pub taken_from: Option<(String, usize)>,
-    /// Bytes of the representatives' samples.
-    pub representative_bytes: u64,
-    /// Bytes of the tile's index.
-    pub index_bytes: u64,
-    /// Bytes of the tile's raw samples.
-    pub tile_bytes: u64,
-    /// Bytes of the whole measurement's raw samples.
-    pub measurement_bytes: u64,
-}
-
-/// Why there was no further pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Ended {
-    /// Nothing moved, or the objective fell by less than the tolerance.
-    Settled,
-    /// There were as many as allowed.
-    Passes,
-    /// The time was over.
-    Time,
-}
-
 impl Ended {
     fn of(passes: &[Pass], limits: Limits) -> Self {
         if (Limits { passes: usize::MAX, ..limits }).reached(passes) {
-            Self::Settled
+            Self::Converged
         } else if passes.len() >= limits.passes {
             Self::Passes
         } else {
@@ -222,9 +159,8 @@ pub struct Plan {
 
 /// Digest of the measurement that a model was begun from, where it is known.
 fn measurement_of(model: &Model) -> Result<Option<String>> {
-    let entry = model.stage(Stage::Tile)?.unwrap_or_default();
-    let digest = entry.get("recipe").and_then(|recipe| recipe.get("measurement")).and_then(Value::as_str);
-    Ok(digest.map(str::to_owned))
+    let recipe = || model.recipe::<TileRecipe>(Stage::Tile);
+    Ok(if model.has(Stage::Tile)? { Some(recipe()?.measurement) } else { None })
 }
 
 /// Opens the measurement that a model was begun from.
@@ -242,14 +178,22 @@ pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Re
     let (expected, found) = (measurement_of(model)?, measurement.digest());
     let Some(expected) = expected.filter(|expected| expected != found) else { return Ok(()) };
     let [expected, found] = [expected.as_str(), found].map(recipe::shortened);
+    // Where the model says that its measurement lies, another one is the same imported anew.
+    let real = |path: &Path| path.canonicalize().ok();
+    let name = measurement_name(model.path());
+    let places = origin::places(model.path(), origin::MEASUREMENT, name.to_str());
+    let anew = places.iter().any(|place| real(place).is_some() && real(place) == real(measurement.path()));
     let (model, measurement) = (model.path().display(), measurement.path().display());
+    let todo = if anew {
+        format!("make the model anew of what it is now: btf model {measurement} {model} --force")
+    } else {
+        "name the measurement that the model was made of, or the model of this measurement".to_owned()
+    };
     Err(Error::recipe(format!(
         "{measurement} is not what {model} was made of: it was imported anew since in another way, or is another \
          measurement (digest {expected}, now {found})"
     ))
-    .hint(format!(
-        "name the measurement that it was made of, or make the model anew: btf model {measurement} {model} --force"
-    )))
+    .hint(todo))
 }
 
 /// The name that the measurement of a model has by default: `wood.zarr` of `wood.model.zarr`.
@@ -294,20 +238,17 @@ pub fn plan(options: &Options) -> Result<Plan> {
         ))
         .hint("choose a smaller ratio"));
     }
-    let mut recipe = json!({
-        "stage": "cluster", "method": METHOD,
-        "tile": tile_digest,
-        "amount": options.amount,
-        "centre": options.centre,
-        "limits": options.limits,
-        "sample": options.sample,
-        "restarts": options.restarts,
-        "seed": options.seed,
-    });
-    // Left out where it is not given, so that what was made before there was a choice counts as done.
-    if let Some(first) = options.first {
-        recipe["first"] = json!(first);
-    }
+    let recipe = ClusterRecipe {
+        tile: tile_digest,
+        amount: options.amount,
+        centre: options.centre,
+        limits: options.limits,
+        sample: options.sample,
+        restarts: options.restarts,
+        seed: options.seed,
+        first: options.first,
+    };
+    let recipe = recipe.to_value()?;
     let first = options.first.unwrap_or(First::Sample);
     let order = if first == First::Sample { Order::Rows } else { Order::Drawn(options.seed) };
     let arrangement = Arrangement::new(&description.views, description.lights.len());
@@ -402,14 +343,14 @@ impl Plan {
         Work::new(self, state.centres.len() / (views * lights), context)
     }
 
-    /// The first approach: the state that the first pass over all texels begins with.
+    /// The initial clustering: the state that the first pass over all texels begins with.
     fn prepare(
         &self,
         passes: &Passes,
         deadline: Option<Instant>,
         context: &Context<'_>,
     ) -> Result<(usize, State)> {
-        let state = self.approach(deadline, context)?;
+        let state = self.initial_clustering(deadline, context)?;
         passes.write_state(0, self.brdf(), &state)?;
         Ok((0, state))
     }

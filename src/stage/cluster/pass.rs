@@ -24,7 +24,7 @@ use crate::store::clustering::{BatchPass, Found, History, Passes, State};
 pub(super) enum Next {
     /// Another one, which begins with this.
     Pass(Box<State>),
-    /// A first approach with more clusters: these left too large an error.
+    /// A initial clustering with more clusters: these left too large an error.
     Restart(Box<History>),
     /// Nothing.
     Finished(Box<Clustered>),
@@ -73,7 +73,7 @@ impl<'a> Work<'a> {
         let blocks = 0..self.plan.blocks_of(&state.history)?;
         let texels = self.plan.selection.slots_of(&blocks).len();
         context.progress.begin(&title(&state.history), texels as u64, Counted::Items("texels"));
-        lloyd::tell(&state.history.passes, self.plan.options.limits, self.pass_time, context);
+        lloyd::announce(&state.history.passes, self.plan.options.limits, self.pass_time, context);
         let start = Instant::now();
         let found = self.assign(blocks, state, context)?;
         self.pass_time = state.history.batch.is_none().then(|| start.elapsed());

@@ -8,7 +8,9 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::run::Context;
-use crate::stage::cluster::{METHOD, Report, measurement_of};
+use crate::run::recipe::Recipe;
+use crate::stage::cluster::{Report, measurement_of};
+use crate::store::model::clusters::TakenRecipe;
 use crate::store::model::{Model, Stage};
 
 /// Which clusters to take.
@@ -40,7 +42,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
             model.path().display()
         )));
     }
-    let recipe = json!({"stage": "cluster", "method": METHOD, "tile": tile, "clusters_of": clusters});
+    let recipe = TakenRecipe { tile, clusters_of: clusters }.to_value()?;
     Ok(Plan { model, from, recipe })
 }
 

@@ -26,7 +26,7 @@ use crate::run::recipe::METHOD;
 use crate::run::{Context, read_ahead};
 use crate::stage::image::{self, Scene, Subject};
 
-use place::Place;
+use place::PyramidFiles;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
@@ -60,7 +60,7 @@ pub struct Plan {
     scene: Scene,
     pyramid: Pyramid,
     encoding: Encoding,
-    place: Place,
+    place: PyramidFiles,
     recipe: Value,
 }
 
@@ -92,7 +92,7 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
             TILE_SIDES.end()
         )));
     }
-    let place = Place::new(&options.output, options.encoding)?;
+    let place = PyramidFiles::new(&options.output, options.encoding)?;
     let Subject::Appearance { view, light } = options.picture.subject else {
         return Err(Error::usage("a pyramid shows the material under a light, not its index or its normals"));
     };
@@ -194,7 +194,8 @@ impl Plan {
         Ok([(&self.place.page, viewer), (&self.place.description, description)])
     }
 
-    /// Keeps beside the recipe the checksums of all tiles, by which exchanged ones are found, and what tiles do not hold.
+    /// Keeps beside the recipe the checksums of all tiles, by which exchanged ones are found, and what tiles do not
+    /// hold.
     fn end(&self, notes: &[String]) -> Result<()> {
         let mut state = self.place.state()?.unwrap_or_default();
         let checksums = verify::checksums(&self.pyramid, &self.place)?;

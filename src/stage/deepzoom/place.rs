@@ -9,17 +9,18 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::is_lock;
-use crate::disk::output::{expect_outside_stores, holds, settle};
+use crate::disk::output::{expect_outside_stores, holds, put_in_place};
 use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
+use crate::run::recipe::Made;
 use crate::run::{Context, Existing, recipe};
 use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
 use crate::zarr::storage::MappedStorage;
 use crate::zarr::{FORMAT, Store, metadata};
 
 /// The files of a pyramid.
-pub(super) struct Place {
+pub(super) struct PyramidFiles {
     /// The description, `NAME.dzi`.
     pub(super) description: PathBuf,
     /// The viewer, `NAME.html`.
@@ -30,7 +31,7 @@ pub(super) struct Place {
     ending: &'static str,
 }
 
-impl Place {
+impl PyramidFiles {
     /// The place of a pyramid whose description is called `output`.
     pub(super) fn new(output: &Path, encoding: Encoding) -> Result<Self> {
         let ends = output.extension().is_some_and(|ending| ending == "dzi");
@@ -64,11 +65,11 @@ impl Place {
     /// Checks that nothing lies there, or what the same recipe began, or what may be replaced.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] for another recipe's pyramid, [`crate::Kind::Input`] for other files.
+    /// [`crate::ErrorKind::Recipe`] for another recipe's pyramid, [`crate::ErrorKind::Input`] for other files.
     pub(super) fn check(&self, recipe: &Value, existing: Existing) -> Result<()> {
         expect_outside_stores(&self.description)?;
         match self.compare(recipe) {
-            Err(error) if existing == Existing::Replace && error.kind() == crate::Kind::Recipe => Ok(()),
+            Err(error) if existing == Existing::Replace && error.kind() == crate::ErrorKind::Recipe => Ok(()),
             other => other,
         }
     }
@@ -76,13 +77,13 @@ impl Place {
     fn compare(&self, recipe: &Value) -> Result<()> {
         // A damaged one is another one: it can be replaced on request.
         let state = self.state().map_err(|error| match error.kind() {
-            crate::Kind::Input => {
+            crate::ErrorKind::Input => {
                 Error::recipe(error.to_string()).hint("choose another name, or use --force")
             }
             _ => error,
         })?;
         if let Some(found) = state {
-            return recipe::expect_same(&self.description, &found, recipe);
+            return Made::of(&found).expect(&self.description, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|entry| temporary::is_temporary(&entry.path()) || is_lock(&entry.path()))
@@ -150,7 +151,7 @@ impl Place {
 
     /// Removes another recipe's pyramid.
     fn remove_another(&self, recipe: &Value) -> Result<()> {
-        let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::Kind::Recipe);
+        let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::ErrorKind::Recipe);
         if !is_another || !self.folder.join(STATE).is_file() {
             return Ok(());
         }
@@ -164,16 +165,13 @@ impl Place {
                 _ => {}
             }
         }
-        temporary::remove_folder(&self.folder, |path| {
-            let is_tile = path.extension().is_some_and(|ending| ending == "png" || ending == "jpg");
-            is_tile && path.components().count() == 2 || path == Path::new(STATE)
-        })
+        temporary::remove_folder(&self.folder, |path| is_tile(path) || path == Path::new(STATE))
     }
 
     /// Refuses a page or a description that lies there and is another's, before any work.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`]; where it may be replaced, only for what is no file.
+    /// [`crate::ErrorKind::Recipe`]; where it may be replaced, only for what is no file.
     pub(super) fn expect_texts(&self, texts: &[(&Path, String)], existing: Existing) -> Result<()> {
         for (path, text) in texts {
             if path.symlink_metadata().is_err() || holds(path, text.as_bytes())? {
@@ -201,6 +199,16 @@ impl Place {
             Ok(temporary)
         };
         let temporary = written().map_err(|error| Error::io("write", path, error))?;
-        settle(temporary.path(), path, existing).map(drop)
+        put_in_place(temporary.path(), path, existing).map(drop)
     }
+}
+
+/// Whether a file is called as a tile is, `level/column_row.png`, by its way from the folder.
+fn is_tile(path: &Path) -> bool {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let parts: Option<Vec<&str>> = path.iter().map(|part| part.to_str()).collect();
+    let Some([level, file]) = parts.as_deref() else { return false };
+    let stem = file.strip_suffix(".png").or_else(|| file.strip_suffix(".jpg"));
+    let place = stem.and_then(|stem| stem.split_once('_'));
+    is_number(level) && place.is_some_and(|(column, row)| is_number(column) && is_number(row))
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value};
 
 use super::TILE_SIDES;
-use super::place::Place;
+use super::place::PyramidFiles;
 use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::pyramid::Pyramid;
@@ -76,7 +76,7 @@ impl Recipe {
 }
 
 /// Checksums of the tiles: for each level, [`DIGITS`] hexadecimal digits for each row of tiles.
-pub(super) fn checksums(pyramid: &Pyramid, place: &Place) -> Result<Vec<String>> {
+pub(super) fn checksums(pyramid: &Pyramid, place: &PyramidFiles) -> Result<Vec<String>> {
     let of_level = |level: u32| {
         let rows = pyramid.grid(pyramid.level(level)).height;
         let sums: Result<Vec<String>> =
@@ -86,7 +86,7 @@ pub(super) fn checksums(pyramid: &Pyramid, place: &Place) -> Result<Vec<String>>
     (0..=pyramid.top()).map(of_level).collect()
 }
 
-fn checksum(pyramid: &Pyramid, place: &Place, level: u32, row: usize) -> Result<String> {
+fn checksum(pyramid: &Pyramid, place: &PyramidFiles, level: u32, row: usize) -> Result<String> {
     let columns = pyramid.grid(pyramid.level(level)).width;
     let mut sum = 0;
     for column in 0..columns {
@@ -110,7 +110,7 @@ struct Opened {
     state: Map<String, Value>,
     recipe: Recipe,
     pyramid: Pyramid,
-    place: Place,
+    place: PyramidFiles,
 }
 
 impl Opened {
@@ -126,7 +126,7 @@ impl Opened {
             Error::input(format!("{}: the recipe of its tiles: {what}", description.display()))
                 .hint("make the pyramid anew: under another name, or with --force")
         };
-        let state = Place::new(&description, Encoding::Png)?.state()?.ok_or_else(|| {
+        let state = PyramidFiles::new(&description, Encoding::Png)?.state()?.ok_or_else(|| {
             Error::missing(format!(
                 "{}: no folder of tiles with a recipe of this program",
                 description.display()
@@ -135,7 +135,7 @@ impl Opened {
         let recipe = state.get("recipe").cloned().unwrap_or_default();
         let recipe: Recipe = serde_json::from_value(recipe).map_err(|error| refused(&error.to_string()))?;
         let pyramid = recipe.pyramid().ok_or_else(|| refused("sizes that no pyramid has"))?;
-        let place = Place::new(&description, recipe.encoding())?;
+        let place = PyramidFiles::new(&description, recipe.encoding())?;
         Ok(Self { description, state, recipe, pyramid, place })
     }
 }
@@ -231,7 +231,7 @@ pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
 const MOST_MISSING: usize = 20;
 
 /// Decodes a tile and looks at its size.
-fn tile(pyramid: &Pyramid, place: &Place, level: u32, row: usize, column: usize) -> Result<()> {
+fn tile(pyramid: &Pyramid, place: &PyramidFiles, level: u32, row: usize, column: usize) -> Result<()> {
     let path = place.tile(level, row, column);
     let damaged = |what: String| Error::input(format!("{}: {what}", path.display())).hint(ANEW);
     let file = open(&path)?;
@@ -247,7 +247,7 @@ fn tile(pyramid: &Pyramid, place: &Place, level: u32, row: usize, column: usize)
 }
 
 /// Compares the description and the viewer with what they follow from.
-fn texts(pyramid: &Pyramid, place: &Place, encoding: Encoding, report: &mut Report) -> Result<()> {
+fn texts(pyramid: &Pyramid, place: &PyramidFiles, encoding: Encoding, report: &mut Report) -> Result<()> {
     let page = page::viewer(pyramid, encoding, &place.name)?;
     for (path, expected) in [(&place.description, page::description(pyramid, encoding)), (&place.page, page)]
     {

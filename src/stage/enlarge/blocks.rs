@@ -2,14 +2,12 @@
 //! make any window alone. Nothing is kept between blocks, so any process makes any of them in any order, and a killed
 //! run goes on with those that are missing.
 
-use serde_json::{Map, Value, json};
-
 use super::{Output, Subject, Units};
 use crate::error::Result;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
-use crate::store::enlarged::{Description, Enlarged, SHARD_SIDE, Texels};
+use crate::store::enlarged::{Description, EnlargeRecipe, Enlarged, SHARD_SIDE, Texels};
 
 /// Shards of a block along each side.
 const BLOCK_SHARDS: usize = 2;
@@ -33,10 +31,10 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// What it says of itself in recipes.
-    pub(super) fn recipe(self) -> Map<String, Value> {
-        let settings = [("source", json!(self.source)), ("keep_normals", json!(self.normals))];
-        settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    /// Adds it to a recipe.
+    pub(super) fn describe(self, recipe: &mut EnlargeRecipe) {
+        recipe.source = Some(self.source);
+        recipe.keep_normals = self.normals;
     }
 }
 

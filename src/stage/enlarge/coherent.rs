@@ -1,7 +1,5 @@
 //! The coherent rule: every block of shards is a window of the endless plane, made alone.
 
-use serde_json::{Map, Value, json};
-
 use super::blocks::{self, Kept, Tile};
 use super::{Output, Rule, Subject, Units};
 use crate::error::{Error, Result};
@@ -9,7 +7,7 @@ use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
 use crate::run::Context;
 use crate::stage::image::of_stage;
-use crate::store::enlarged::Method;
+use crate::store::enlarged::{EnlargeRecipe, Method};
 use crate::store::model::{Model, Stage};
 
 /// Settings of the coherent rule.
@@ -62,10 +60,9 @@ impl Rule for Coherent {
         (blocks::UNIT, blocks::count(subject))
     }
 
-    fn recipe(&self) -> Map<String, Value> {
-        let mut recipe = self.kept.recipe();
-        recipe.insert("jitter".to_owned(), json!(self.jitter));
-        recipe
+    fn describe(&self, recipe: &mut EnlargeRecipe) {
+        self.kept.describe(recipe);
+        recipe.jitter = Some(self.jitter);
     }
 
     /// The appearance of all levels, and a block in work.

@@ -14,16 +14,16 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::names::{ends_with, with_ending};
 use crate::run::Context;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::shape::Size;
 use crate::stage::cluster;
 use crate::stage::import::Shard;
-use crate::store::enlarged::{Enlarged, Method};
+use crate::store::enlarged::{EnlargeRecipe, Enlarged, Method};
 use crate::store::model::{Model, Stage, index_bytes};
 pub use verdict::Verdict;
 
@@ -104,7 +104,7 @@ trait Rule {
     /// What the units of an output are, in the plural, and how many there are.
     fn units(&self, subject: &Subject) -> (&'static str, usize);
     /// What the bytes of an output depend on, beside the model, the size, the seed and whether it joins at its borders.
-    fn recipe(&self) -> Map<String, Value>;
+    fn describe(&self, recipe: &mut EnlargeRecipe);
     /// Memory that a run takes.
     fn memory_bytes(&self, subject: &Subject, threads: usize) -> u64;
     /// What to do where that is too much.
@@ -174,21 +174,20 @@ fn numbered(output: &Path, number: u64) -> PathBuf {
 impl Subject {
     fn recipe(&self, rule: &dyn Rule, seed: u64) -> Result<Value> {
         let Options { size, tileable, .. } = self.options;
-        let mut recipe = json!({
-            "stage": "enlarge", "method": METHOD,
-            "model": self.model.digest_of(rule.method().stages())?,
-            "size": [size.height, size.width],
-            "seed": seed,
-            "tileable": tileable,
-        });
-        if let Some(recipe) = recipe.as_object_mut() {
-            // The paper's recipes came first and name no rule.
-            if rule.method() != Method::default() {
-                recipe.insert("rule".to_owned(), json!(rule.method()));
-            }
-            recipe.extend(rule.recipe());
-        }
-        Ok(recipe)
+        let mut recipe = EnlargeRecipe {
+            model: self.model.digest_of(rule.method().stages())?,
+            size: [size.height, size.width],
+            seed,
+            tileable,
+            rule: rule.method(),
+            source: None,
+            keep_normals: false,
+            candidates: None,
+            jitter: None,
+            tiles: None,
+        };
+        rule.describe(&mut recipe);
+        recipe.to_value()
     }
 
     /// Bytes of one output's index.

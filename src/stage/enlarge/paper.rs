@@ -1,8 +1,6 @@
 //! The paper's rule: synthesise normals row by row, find each one's nearest normals of the tile, choose by (25). Rows
 //! flow through; memory is some bands and a row of shards.
 
-use serde_json::{Map, Value, json};
-
 use super::pipeline::{Band, Chooser, Pipeline, Source};
 use super::{Output, Rule, Subject, Units};
 use crate::error::{Error, Result};
@@ -16,7 +14,7 @@ use crate::run::recipe;
 use crate::shape::{Size, Window};
 use crate::stage::import::Shard;
 use crate::store::enlarged::state::EnlargeState;
-use crate::store::enlarged::{Description, Enlarged, Method, SHARD_SIDE, Texels};
+use crate::store::enlarged::{Description, EnlargeRecipe, Enlarged, Method, SHARD_SIDE, Texels};
 use crate::words::counted;
 
 /// Candidates unless their number is given.
@@ -168,10 +166,9 @@ impl Rule for Paper {
         ("rows of shards", subject.options.size.height.div_ceil(SHARD_SIDE))
     }
 
-    fn recipe(&self) -> Map<String, Value> {
-        let (candidates, keep_normals) = (self.candidates, self.options.keep_normals);
-        let settings = [("candidates", json!(candidates)), ("keep_normals", json!(keep_normals))];
-        settings.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    fn describe(&self, recipe: &mut EnlargeRecipe) {
+        recipe.candidates = Some(self.candidates);
+        recipe.keep_normals = self.options.keep_normals;
     }
 
     /// Bands, a row of shards, the field, and what belongs to the tile.

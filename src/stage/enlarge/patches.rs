@@ -1,14 +1,12 @@
 //! Pieces of the tile on a grid: repeated, laid at random, or stitched. Any window is made alone.
 
-use serde_json::{Map, Value, json};
-
 use super::blocks::{self, Kept, Tile};
 use super::{Output, Rule, Subject, Units};
 use crate::error::{Error, Result};
 use crate::method::baseline::{Exemplar, Repeat, Roller, Tiles};
 use crate::run::Context;
 use crate::shape::{Size, Window};
-use crate::store::enlarged::Method;
+use crate::store::enlarged::{EnlargeRecipe, Method};
 
 /// What pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,12 +100,11 @@ impl Rule for Patches {
         (blocks::UNIT, blocks::count(subject))
     }
 
-    fn recipe(&self) -> Map<String, Value> {
-        let mut recipe = self.kept.recipe();
+    fn describe(&self, recipe: &mut EnlargeRecipe) {
+        self.kept.describe(recipe);
         if let Pieces::Tiles(count) = self.pieces {
-            recipe.insert("tiles".to_owned(), json!(count));
+            recipe.tiles = Some(count);
         }
-        recipe
     }
 
     /// The distances, the pieces, and a block in work.

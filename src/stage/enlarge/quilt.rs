@@ -1,8 +1,6 @@
 //! Image quilting: rows of blocks flow into rows of shards, from the top down. A killed run starts over and writes the
 //! rows of shards that are missing.
 
-use serde_json::{Map, Value};
-
 use super::blocks::{FIXED_BYTES, Kept, Tile, is_done};
 use super::patches::exemplar;
 use super::{Output, Rule, Subject, Units};
@@ -12,7 +10,7 @@ use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::{Size, Window};
 use crate::stage::import::Shard;
-use crate::store::enlarged::{Method, SHARD_SIDE};
+use crate::store::enlarged::{EnlargeRecipe, Method, SHARD_SIDE};
 
 /// Settings of image quilting.
 #[derive(Clone, Debug)]
@@ -93,8 +91,8 @@ impl Rule for Quilting {
         ("rows of shards", subject.options.size.height.div_ceil(SHARD_SIDE))
     }
 
-    fn recipe(&self) -> Map<String, Value> {
-        self.kept.recipe()
+    fn describe(&self, recipe: &mut EnlargeRecipe) {
+        self.kept.describe(recipe);
     }
 
     /// The distances, a row of blocks, and a row of shards with what is written of it.

@@ -71,7 +71,8 @@ type Written = (Made, Vec<String>);
 /// Writes a whole measurement as an archive.
 ///
 /// # Errors
-/// A measurement that is not complete, or that the format cannot hold; [`crate::Kind::Recipe`] where other files are.
+/// A measurement that is not complete, or that the format cannot hold; [`crate::ErrorKind::Recipe`] where other files
+/// are.
 pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
     expect_outside_stores(&options.output)?;
     let views = measurement.description().views.len();
@@ -89,8 +90,8 @@ pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) 
     context.require(&what, VIEW_COPIES * description.view_bytes())?;
     let (made, warnings) = match options.format {
         Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
-        Format::Exr => pictures::folder(measurement, options, pictures::Kind::Exr, context)?,
-        Format::Png => pictures::folder(measurement, options, pictures::Kind::Png, context)?,
+        Format::Exr => pictures::folder(measurement, options, pictures::FileKind::Exr, context)?,
+        Format::Png => pictures::folder(measurement, options, pictures::FileKind::Png, context)?,
         Format::Npy => npy::write(measurement, options, context)?,
         Format::Hdf5 => hdf5(measurement, options, context)?,
         Format::Dfmf => bonn::dfmf(measurement, options, context)?,

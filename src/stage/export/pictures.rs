@@ -19,7 +19,7 @@ use crate::store::measurement::{Description, Measurement};
 
 /// Format of the pictures in a folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum FileKind {
     Exr,
     Png,
 }
@@ -97,12 +97,12 @@ fn display_codes(images: &Samples, description: &Description, beyond: &Beyond) -
 pub(super) fn folder(
     measurement: &Measurement,
     options: &Options,
-    kind: Kind,
+    kind: FileKind,
     context: &Context<'_>,
 ) -> Result<Written> {
     let description = measurement.description();
     let integers = matches!(description.sample_type, SampleType::U8 | SampleType::U16);
-    if kind == Kind::Png && (!integers || !matches!(description.n_channels(), 1 | 3)) {
+    if kind == FileKind::Png && (!integers || !matches!(description.n_channels(), 1 | 3)) {
         return Err(Error::input(format!(
             "PNGs hold integers of 1 or 3 channels, the samples are {} of {}",
             description.sample_type.name(),
@@ -111,8 +111,8 @@ pub(super) fn folder(
         .hint("export to a folder of EXRs instead"));
     }
     let notes = match kind {
-        Kind::Exr => Vec::new(),
-        Kind::Png => {
+        FileKind::Exr => Vec::new(),
+        FileKind::Png => {
             loss::of_format(description, Takes { bits: 16, names: false, mixes: false, linear: false })
         }
     };
@@ -132,8 +132,8 @@ pub(super) fn folder(
     Ok((made, notes))
 }
 
-fn picture_bytes(samples: Samples, description: &Description, kind: Kind) -> Result<Vec<u8>> {
-    let samples = if kind == Kind::Exr { linear(&samples, description.transfer) } else { samples };
+fn picture_bytes(samples: Samples, description: &Description, kind: FileKind) -> Result<Vec<u8>> {
+    let samples = if kind == FileKind::Exr { linear(&samples, description.transfer) } else { samples };
     let picture = Picture {
         width: description.size.width as u32,
         height: description.size.height as u32,
@@ -141,19 +141,19 @@ fn picture_bytes(samples: Samples, description: &Description, kind: Kind) -> Res
         samples,
     };
     Ok(match kind {
-        Kind::Exr => picture::exr::encode(&picture, picture::exr::Compression::Zip)?,
-        Kind::Png => picture::png::encode(&picture)?,
+        FileKind::Exr => picture::exr::encode(&picture, picture::exr::Compression::Zip)?,
+        FileKind::Png => picture::png::encode(&picture)?,
     })
 }
 
 /// `tvT_pvP/tvT_pvP_tlT_plP.exr`, degrees to nine decimals without needless zeros.
-fn name(view: Direction, light: Direction, kind: Kind) -> PathBuf {
+fn name(view: Direction, light: Direction, kind: FileKind) -> PathBuf {
     let text = |direction: Direction, side: char| {
         let round = |angle: f64| (angle * 1e9).round() / 1e9;
         let (theta, phi) = direction.degrees();
         format!("t{side}{}_p{side}{}", round(theta), round(phi.rem_euclid(360.0)))
     };
-    let extension = if kind == Kind::Exr { "exr" } else { "png" };
+    let extension = if kind == FileKind::Exr { "exr" } else { "png" };
     let (view, light) = (text(view, 'v'), text(light, 'l'));
     Path::new(&view).join(format!("{view}_{light}.{extension}"))
 }

@@ -13,8 +13,9 @@ use crate::method::field::{self, Boundary, Coordinates, Gains, Surface};
 use crate::method::tile::Tile;
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::store::model::field::FieldReport;
+use crate::store::model::field::FitRecipe;
 use crate::store::model::{Model, Stage};
 
 /// Memory of a texel of the tile: the pyramids, their moments, and a synthesis for each number of levels (measured).
@@ -29,7 +30,7 @@ pub struct Options {
     /// The model with the normal map.
     pub model: PathBuf,
     /// Channels together or one by one.
-    pub kind: field::Kind,
+    pub kind: field::CarKind,
     /// Levels of the pyramid; as many as the data carry where absent.
     pub levels: Option<usize>,
     /// What the channels of the field are.
@@ -45,7 +46,7 @@ impl Options {
     pub fn of(model: PathBuf) -> Self {
         Self {
             model,
-            kind: field::Kind::Car3d,
+            kind: field::CarKind::Car3d,
             levels: None,
             coordinates: Coordinates::Normals,
             gains: Gains::Matched,
@@ -64,16 +65,15 @@ pub struct Plan {
 /// Checks that the model has a normal map.
 pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
-    let normals = model.stage_digest(Stage::Normals)?;
-    let recipe = json!({
-        "stage": "fit", "method": METHOD,
-        "normals": normals,
-        "mrf": options.kind,
-        "levels": options.levels,
-        "field": options.coordinates,
-        "gains": options.gains,
-        "marginals": options.matching,
-    });
+    let recipe = FitRecipe {
+        normals: model.stage_digest(Stage::Normals)?,
+        mrf: options.kind,
+        levels: options.levels,
+        field: options.coordinates,
+        gains: options.gains,
+        marginals: options.matching,
+    };
+    let recipe = recipe.to_value()?;
     Ok(Plan { model, options: options.clone(), recipe })
 }
 
@@ -95,7 +95,7 @@ impl Plan {
         };
         context.progress.begin("fit", 1, Counted::Items("field"));
         let tile = self.model.tile()?;
-        let needed = FIXED_BYTES + TEXEL_BYTES * tile.size.texels() as u64;
+        let needed = memory_bytes(tile.size.texels());
         context.require(&format!("fitting the field of a tile of {}", tile.size), needed)?;
         let normals = self.model.normals()?;
         let Options { kind, levels, coordinates, gains, matching, .. } = self.options;
@@ -110,6 +110,11 @@ impl Plan {
         context.progress.end();
         Ok(report)
     }
+}
+
+/// Memory that fitting a tile of so many texels takes.
+pub(crate) fn memory_bytes(texels: usize) -> u64 {
+    FIXED_BYTES + TEXEL_BYTES * texels as u64
 }
 
 /// The statistics of a fitted model's tile and of a synthesis.

@@ -172,6 +172,33 @@ pub fn of_measurement(
     Ok(Picture::linear(window.size, mixed(measurement, &appearance, &decoder, window, &beyond, context)?))
 }
 
+/// What a user should know of a view and a light that nothing was measured at or around, or that look like radians.
+pub fn notes_of_directions(measured: [&[Direction]; 2], view: Direction, light: Direction) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (name, list, wanted) in [("view", measured[0], view), ("light", measured[1], light)] {
+        if let Some(shown) = Interpolator::new(list, &triangulate(list)).shown_instead(wanted) {
+            let scaled = if name == "light" { ", scaled by the cosine" } else { "" };
+            notes.push(format!(
+                "the {name} at {wanted} lies beyond the measured ones: this shows the {name} at {shown}{scaled}"
+            ));
+        }
+        if looks_like_radians(wanted) {
+            let degrees = btfkit_formats::six_digits(wanted.degrees().0.to_degrees());
+            notes.push(format!(
+                "angles are degrees: the {name} at {wanted} is taken as it is, theta in radians would be {degrees} degrees"
+            ));
+        }
+    }
+    notes
+}
+
+/// Whether angles in degrees look like angles in radians: small, with more than one decimal.
+fn looks_like_radians(direction: Direction) -> bool {
+    let (theta, phi) = direction.degrees();
+    let is_fine = |angle: f64| (angle * 10.0 - (angle * 10.0).round()).abs() > 1e-6;
+    theta > 0.0 && theta <= 1.6 && (0.0..6.3).contains(&phi) && (is_fine(theta) || is_fine(phi))
+}
+
 /// How a measurement is mixed under a light, seen from a view.
 fn measured_appearance(measurement: &Measurement, view: Direction, light: Direction) -> Appearance {
     let description = measurement.description();

@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 use super::{
     Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, expect_colors, look_up, mixed,
-    of_measured_tile,
+    notes_of_directions, of_measured_tile,
 };
 use crate::color::Decoder;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
 use crate::picture::{Meaning, Picture, false_color};
@@ -43,6 +43,8 @@ pub struct Scene {
     /// What tells its pixels apart from those of another source.
     recipe: Value,
     beyond: Beyond,
+    /// What is shown instead of a view or a light that was not measured.
+    directions: Vec<String>,
     /// That the store is not complete yet, though what is shown may be.
     incomplete: Option<String>,
 }
@@ -72,6 +74,14 @@ enum Source {
         variation: Variation,
         tile: Picture,
     },
+}
+
+/// What is pictured, as it was opened.
+struct Opened {
+    source: Source,
+    size: Size,
+    /// As in a [`Scene`].
+    directions: Vec<String>,
 }
 
 /// Pixels of some rows; looked up row by row, since numbers take less memory.
@@ -138,20 +148,27 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
-        let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
-        let digest = attributes.get("digest").cloned().unwrap_or_default();
+        let store = Store::at(path);
+        let attributes = store.expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
+        let digest = attributes.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
         let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
+        if kind != model::KIND {
+            store.see("", &digest);
+        }
         if options.plane.is_some() && kind != model::KIND {
             return Err(Error::usage(format!(
                 "{}: an endless plane is made of a model, got a {kind}",
                 path.display()
             )));
         }
-        let (source, size) = match (kind, options.plane) {
-            (measurement::KIND, _) => of_measurement(Measurement::open(path)?, options)?,
-            (model::KIND, None) => of_tile(&Model::open(path)?, options, context)?,
+        let (Opened { source, size, directions }, digest) = match (kind, options.plane) {
+            (measurement::KIND, _) => (of_measurement(Measurement::open(path)?, options)?, digest),
+            (model::KIND, None) => {
+                let model = Model::open(path)?;
+                (of_tile(&model, options, context)?, model.stage_digest(Stage::Cluster)?)
+            }
             (model::KIND, Some(plane)) => return of_plane(&Model::open(path)?, options, plane, context),
-            (enlarged::KIND, _) => of_enlarged(Enlarged::open(path)?, options, context)?,
+            (enlarged::KIND, _) => (of_enlarged(Enlarged::open(path)?, options, context)?, digest),
             _ => {
                 return Err(Error::input(format!(
                     "{}: cannot picture a store of kind {kind}",
@@ -159,6 +176,7 @@ impl Scene {
                 )));
             }
         };
+        store.expect_unchanged()?;
         let whole = Area { y: 0, x: 0, size };
         let area = options.window.unwrap_or(whole);
         if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
@@ -168,11 +186,6 @@ impl Scene {
                 part.width, part.height
             )));
         }
-        let digest = if kind == model::KIND {
-            json!(Model::open(path)?.stage_digest(Stage::Cluster)?)
-        } else {
-            digest
-        };
         let mut recipe = json!({"kind": kind, "digest": digest, "size": [size.height, size.width]});
         if area != whole {
             recipe["window"] = json!([area.x, area.y, area.size.width, area.size.height]);
@@ -181,18 +194,19 @@ impl Scene {
             recipe["values"] = json!("measured");
         }
         let incomplete = source.incomplete(path);
-        Ok(Self { source, area, recipe, beyond: Beyond::default(), incomplete })
+        Ok(Self { source, area, recipe, beyond: Beyond::default(), directions, incomplete })
     }
 
     /// What a user should know of the picture: what display values do not hold of it, and what its store lacks.
     pub fn notes(&self) -> Vec<String> {
-        self.incomplete.iter().cloned().chain(self.beyond.notes()).collect()
+        let told = self.incomplete.iter().chain(&self.directions).cloned();
+        told.chain(self.beyond.notes()).collect()
     }
 
     /// Says of an error that something is missing how much of the store is.
     pub(crate) fn explain(&self, error: Error) -> Error {
         match &self.incomplete {
-            Some(told) if error.kind() == Kind::Missing => {
+            Some(told) if error.kind() == ErrorKind::Missing => {
                 let told = told.split("; ").next().unwrap_or_default();
                 let hint = error.guidance().unwrap_or_default().to_owned();
                 Error::missing(format!("{error}: {told}")).hint(hint)
@@ -362,7 +376,7 @@ pub(crate) fn plane_rows(plane: &Plane, variation: &Variation, area: Area) -> Re
     Ok(source)
 }
 
-fn of_measurement(measurement: Measurement, options: &Options) -> Result<(Source, Size)> {
+fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened> {
     let Subject::Appearance { view, light } = options.subject else {
         return Err(Error::usage(
             "a measurement has no index and no normal map yet: picture its model instead",
@@ -370,14 +384,22 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<(Source
     };
     let description = measurement.description();
     let (size, decoder) = (description.size, description.decoder()?);
+    let directions = notes_of_directions([&description.views, &description.lights], view, light);
     let appearance = super::measured_appearance(&measurement, view, light);
-    Ok((Source::Measurement { measurement, appearance, decoder }, size))
+    Ok(Opened { source: Source::Measurement { measurement, appearance, decoder }, size, directions })
 }
 
-fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {
+fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let tile = tile_picture(model, options, context)?;
     let size = tile.size;
-    Ok((Source::Tile(tile), size))
+    Ok(Opened { source: Source::Tile(tile), size, directions: of_model(model, options)? })
+}
+
+/// What is to be said of the directions of a picture of a model.
+fn of_model(model: &Model, options: &Options) -> Result<Vec<String>> {
+    let Subject::Appearance { view, light } = options.subject else { return Ok(Vec::new()) };
+    let [views, lights] = model.directions()?;
+    Ok(notes_of_directions([&views, &lights], view, light))
 }
 
 /// The tile's texels under the light, by clusters or as measured, or in false colours.
@@ -464,19 +486,19 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         area,
         recipe,
         beyond: Beyond::default(),
+        directions: of_model(model, options)?,
         incomplete: None,
     })
 }
 
-fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<(Source, Size)> {
+fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let size = enlarged.size();
+    let mut directions = Vec::new();
     let source = match options.subject {
         Subject::Appearance { view, light } if options.values == Values::Model => {
-            let colors = cluster_colors(
-                &model_of(&enlarged, &options.source, options.model.as_deref())?,
-                view,
-                light,
-            )?;
+            let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
+            let colors = cluster_colors(&model, view, light)?;
+            directions = of_model(&model, options)?;
             Source::Clusters { enlarged, colors }
         }
         Subject::Index => Source::Index(enlarged),
@@ -484,6 +506,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
             let tile = tile_picture(&model, options, context)?;
+            directions = of_model(&model, options)?;
             Source::Sources { enlarged, tile }
         }
         Subject::Normals => {
@@ -498,7 +521,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
             .hint("enlarge by another --method than paper, without --no-source"));
         }
     };
-    Ok((source, size))
+    Ok(Opened { source, size, directions })
 }
 
 /// The model that an enlarged index at a path refers to; where it is not named, it is looked for where it lay when the
@@ -537,7 +560,7 @@ pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) 
 pub(crate) fn of_stage<T>(model: &Model, stage: Stage, read: impl FnOnce(&Model) -> Result<T>) -> Result<T> {
     model.stage_digest(stage)?;
     read(model).map_err(|error| match error.kind() {
-        Kind::Missing => {
+        ErrorKind::Missing => {
             error.hint(format!("run `btf {}` on the model: it makes again what is missing", stage.name()))
         }
         _ => error,

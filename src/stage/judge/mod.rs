@@ -210,7 +210,7 @@ fn pairs_of(options: &Options, measurement: &Measurement) -> Result<Vec<[usize; 
 /// The part of the tile that enlargements are made of, whether it wraps, and its lattice: that of the appearance where
 /// there is one.
 fn exemplar_of(model: &Model, tile: &Tile) -> Result<(Window, bool, WaveCounts)> {
-    if model.stage(Stage::Appearance)?.is_none() {
+    if !model.has(Stage::Appearance)? {
         return Ok((tile.size.window(), tile.wraps, WaveCounts::default()));
     }
     let appearance = model.appearance()?;

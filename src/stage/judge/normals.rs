@@ -1,7 +1,5 @@
 //! The normal map judged as two pictures, n_x and n_y, against normals of the real crops by photometric stereo.
 
-use serde_json::{Map, Value};
-
 use super::Crops;
 use super::report::{NormalRows, Normals};
 use super::subject::Subject;
@@ -13,6 +11,7 @@ use crate::run::progress::Counted;
 use crate::shape::Size;
 use crate::stage::normals;
 use crate::store::measurement::Measurement;
+use crate::store::model::normals::NormalsRecipe;
 use crate::store::model::{Model, Stage};
 
 /// Components are judged in hundredths, so that they are about as large as L*.
@@ -31,9 +30,9 @@ pub(super) fn judge(
     context: &Context<'_>,
 ) -> Result<Normals> {
     let absent = |reason: &str| Ok(Normals::Absent { reason: reason.to_owned() });
-    let Some(stage) = model.stage(Stage::Normals)? else {
+    if !model.has(Stage::Normals)? {
         return absent("the model has no normals: run `btf normals`");
-    };
+    }
     let tile = model.normals()?;
     let size = Size::new(crops.side, crops.side);
     let mut enlarged = Vec::new();
@@ -46,8 +45,7 @@ pub(super) fn judge(
             },
         });
     }
-    let recipe = stage.get("recipe").and_then(Value::as_object).cloned().unwrap_or_else(Map::new);
-    let robust = recipe.get("robust").and_then(Value::as_bool).unwrap_or(false);
+    let NormalsRecipe { robust, .. } = model.recipe(Stage::Normals)?;
     let view = normals::frontal_view(measurement);
     let rows = crops.reals.len() * crops.side;
     context.progress.begin("normals", rows as u64, Counted::Items("rows"));

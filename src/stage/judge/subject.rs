@@ -50,6 +50,10 @@ impl Subject {
                 "{} has a size of its own: --size is for a model, whose plane is endless",
                 path.display()
             ))),
+            (model::KIND, Some(_)) if model.is_some() => Err(Error::usage(format!(
+                "{} is a model itself: --model names that of an enlargement",
+                path.display()
+            ))),
             (model::KIND, Some(size)) => {
                 let model = Model::open(path)?;
                 let (tile, index) = (model.tile()?, of_stage(&model, Stage::Cluster, Model::index)?);

@@ -13,11 +13,14 @@ pub(crate) use features::features;
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
 use crate::method::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
-use crate::run::recipe::METHOD;
+use crate::run::budget::OWN_BYTES;
+use crate::run::recipe::Recipe;
 use crate::run::{Context, Existing};
 use crate::shape::Size;
 use crate::stage::cluster::{expect_measurement, measurement_name};
+use crate::stage::{cluster, fit};
 use crate::store::measurement::Measurement;
+use crate::store::model::tile::TileRecipe;
 pub use crate::store::model::tile::TileReport as Report;
 use crate::store::model::{Model, Stage};
 use crate::store::origin;
@@ -72,16 +75,16 @@ pub fn plan(options: &Options) -> Result<Plan> {
     let plane = measurement.description().size;
     let choice = options.choice.resolved(plane);
     range(choice, plane, &Lattice::None, false)?;
-    let mut recipe = json!({
-        "stage": "tile", "method": METHOD,
-        "measurement": measurement.digest(),
-        "tile": choice.to_string(),
-        "seed": options.seed,
-    });
     // Of other tiles only the report tells the lattice.
-    if matches!(choice, Choice::Cut | Choice::Largest) || options.lattice != LatticeChoice::Auto {
-        recipe["lattice"] = options.lattice.to_string().into();
-    }
+    let names_lattice =
+        matches!(choice, Choice::Cut | Choice::Largest) || options.lattice != LatticeChoice::Auto;
+    let recipe = TileRecipe {
+        measurement: measurement.digest().to_owned(),
+        tile: choice.to_string(),
+        seed: options.seed,
+        lattice: names_lattice.then(|| options.lattice.to_string()),
+    };
+    let recipe = recipe.to_value()?;
     Ok(Plan {
         measurement,
         model: options.model.clone(),
@@ -111,6 +114,18 @@ fn range(choice: Choice, plane: Size, lattice: &Lattice, joins: bool) -> Result<
 }
 
 impl Plan {
+    /// Memory that is enough for every stage of a model of such a tile, as far as can be told before there is one.
+    pub fn enough_for_model(&self, clusters: &cluster::Options, threads: usize) -> u64 {
+        let description = self.measurement.description();
+        let texels = match self.choice {
+            Choice::Sized(size) => size.texels(),
+            _ => description.size.texels(),
+        };
+        let own = description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64);
+        let clustering = cluster::enough_bytes(clusters, description, texels, threads);
+        clustering.max(OWN_BYTES + own.max(fit::memory_bytes(texels)))
+    }
+
     /// What would be done.
     pub fn summary(&self) -> Value {
         json!({"stage": "tile", "model": self.model.display().to_string(), "recipe": self.recipe})

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Finding, OLDEST_NOTE, Report, consolidated, kept, unfinished};
-use crate::error::{Kind, Result};
+use crate::error::{ErrorKind, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
@@ -84,7 +84,8 @@ fn tile(enlarged: &Enlarged, path: &Path, named: Option<&Path>, report: &mut Rep
     let model = match model_of(enlarged, path, named) {
         Ok(model) => model,
         Err(error)
-            if named.is_none() && matches!(error.kind(), Kind::Missing | Kind::Recipe | Kind::Input) =>
+            if named.is_none()
+                && matches!(error.kind(), ErrorKind::Missing | ErrorKind::Recipe | ErrorKind::Input) =>
         {
             let note = format!("not compared with its model, name it with --model: {error}");
             report.notes.push(note);
@@ -106,7 +107,7 @@ fn tile(enlarged: &Enlarged, path: &Path, named: Option<&Path>, report: &mut Rep
         report.find("attributes", what, "enlarge anew, under another name");
         return Ok(None);
     }
-    let has_normals = enlarged.has_normals() && model.stage(Stage::Normals)?.is_some();
+    let has_normals = enlarged.has_normals() && model.has(Stage::Normals)?;
     let normals = has_normals.then(|| model.normals()).transpose()?;
     let name = model.path().display().to_string();
     report.checked("compared with", name);

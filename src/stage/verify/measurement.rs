@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
 use crate::archive::Source;
 use crate::color::Remarkable;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::Window;
@@ -192,7 +192,7 @@ fn verify_view(measurement: &Measurement, view: usize) -> Result<(Vec<Damage>, R
             Ok((false, _)) => {
                 (SampleArray::Luminance, "L* codes that are not those of the samples".to_owned())
             }
-            Err((_, error)) if error.kind() == Kind::Io => return Err(error),
+            Err((_, error)) if error.kind() == ErrorKind::Io => return Err(error),
             Err((array, error)) => (array, error.to_string()),
         };
         let file = measurement.shard_path(array, view, window).display().to_string();

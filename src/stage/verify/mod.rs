@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::archive::Source;
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::Context;
 use crate::stage::deepzoom;
 use crate::store::measurement::Measurement;
@@ -79,30 +79,35 @@ pub struct Beside<'a> {
 /// Reads all of what lies at a path.
 ///
 /// # Errors
-/// Where nothing that can be verified lies there, or its attributes are damaged so far that nothing can be looked at; and
-/// those of the operating system. What else is damaged is reported.
+/// Where nothing that can be verified lies there, or its attributes are damaged so far that nothing can be looked at;
+/// and those of the operating system. What else is damaged is reported.
 pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Found> {
     recognise::expect_readable(path)?;
-    let found = if is_pyramid(path) {
-        Found::Other(deepzoom::verify(path, context)?)
+    let kind = if is_pyramid(path) {
+        None
     } else {
         let kinds = [measured::KIND, modelled::KIND, index::KIND];
         let attributes = Store::at(path).expect_one_of(&kinds)?;
-        match attributes.get("kind").and_then(Value::as_str) {
-            Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
-            Some(index::KIND) => Found::Other(enlarged::run(path, beside.model.as_deref(), context)?),
-            _ => {
-                let measurement = Measurement::open(path)?;
-                let report = Box::new(measurement::run(&measurement, beside.source, context)?);
-                Found::Measurement { views: measurement.description().views.len(), report }
-            }
-        }
+        attributes.get("kind").and_then(Value::as_str).map(str::to_owned)
     };
-    if beside.source.is_some() && !matches!(found, Found::Measurement { .. }) {
-        let what = format!("{}: only a measurement can be compared with an archive", path.display());
-        return Err(Error::usage(what));
+    let kind = kind.as_deref();
+    let refused = |what: &str| Error::usage(format!("{}: {what}", path.display()));
+    if beside.source.is_some() && kind != Some(measured::KIND) {
+        return Err(refused("only a measurement can be compared with an archive"));
     }
-    Ok(found)
+    if beside.model.is_some() && kind != Some(index::KIND) {
+        return Err(refused("only an enlargement is compared with its model").hint("leave out --model"));
+    }
+    Ok(match kind {
+        None => Found::Other(deepzoom::verify(path, context)?),
+        Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
+        Some(index::KIND) => Found::Other(enlarged::run(path, beside.model.as_deref(), context)?),
+        Some(_) => {
+            let measurement = Measurement::open(path)?;
+            let report = Box::new(measurement::run(&measurement, beside.source, context)?);
+            Found::Measurement { views: measurement.description().views.len(), report }
+        }
+    })
 }
 
 /// Whether a path names a pyramid: its description or the folder of its tiles.
@@ -151,8 +156,8 @@ fn kept<T>(result: Result<T>, part: &str, findings: &mut Vec<Finding>) -> Result
         Err(error) => error,
     };
     match error.kind() {
-        Kind::Input | Kind::Missing | Kind::Recipe => {
-            let missing = error.kind() == Kind::Missing;
+        ErrorKind::Input | ErrorKind::Missing | ErrorKind::Recipe => {
+            let missing = error.kind() == ErrorKind::Missing;
             let todo = error.guidance().map(str::to_owned);
             push(findings, Finding { part: part.to_owned(), what: error.to_string(), todo, missing });
             Ok(None)

@@ -1,12 +1,11 @@
 //! A model: each stage that is done, its arrays against their ranges and against what they follow from.
 
-use serde_json::{Value, json};
-
 use super::{OLDEST_NOTE, Report, consolidated};
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::stage::{cluster, normals};
+use crate::store::model::clusters::ClusterReport;
+use crate::store::model::normals::NormalsReport;
 use crate::store::model::{KIND, Model, Stage};
 use crate::words::counted;
 use crate::zarr::metadata::OLDEST_FORMAT;
@@ -17,15 +16,14 @@ pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
     context.progress.begin("verify", Stage::ALL.len() as u64, Counted::Items("stages"));
     for stage in Stage::ALL {
         context.check_stop()?;
-        match model.stage(stage)? {
-            None => report.checked(stage.name(), "not run"),
-            Some(entry) => {
-                let before = report.findings.len();
-                input(model, stage, entry.get("recipe").unwrap_or(&Value::Null), &mut report)?;
-                context.install(|| of_stage(model, stage, context, &mut report))?;
-                let found = report.findings.len() - before;
-                report.checked(stage.name(), if found == 0 { "whole" } else { "damaged" });
-            }
+        if model.has(stage)? {
+            let before = report.findings.len();
+            input(model, stage, &mut report)?;
+            context.install(|| of_stage(model, stage, context, &mut report))?;
+            let found = report.findings.len() - before;
+            report.checked(stage.name(), if found == 0 { "whole" } else { "damaged" });
+        } else {
+            report.checked(stage.name(), "not run");
         }
         context.progress.advance(1);
     }
@@ -39,11 +37,11 @@ pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
 }
 
 /// Whether a stage was run on what the stage before it is now.
-fn input(model: &Model, stage: Stage, recipe: &Value, report: &mut Report) -> Result<()> {
-    let Some((before, member)) = stage.input() else { return Ok(()) };
-    let found = recipe.get(member).unwrap_or(&Value::Null);
+fn input(model: &Model, stage: Stage, report: &mut Report) -> Result<()> {
+    let found = report.keep(&format!("recipe of {}", stage.name()), model.input_digest(stage))?;
+    let (Some(Some(found)), Some(before)) = (found, stage.input()) else { return Ok(()) };
     let Some(expected) = report.keep(stage.name(), model.stage_digest(before))? else { return Ok(()) };
-    if *found != json!(expected) {
+    if found != expected {
         let what =
             format!("{}: stage {} is not of this {}", model.path().display(), stage.name(), before.name());
         report.find(stage.name(), what, &format!("run btf {} on it again, with --force", stage.name()));
@@ -59,12 +57,14 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             report.keep("angle coordinates", model.check_coordinates())?;
         }
         Stage::Cluster => {
-            report.keep("report of cluster", model.report::<cluster::Report>(stage))?;
+            report.keep("report of cluster", model.report::<ClusterReport>(stage))?;
             report.keep("index", model.index())?;
             report.keep("centres", model.centres())?;
             report.keep("representative_texel", model.representative_texels())?;
             // Where it cannot be told how many there are, that has been found.
-            if let Ok(clusters) = model.clusters().map(|clusters| clusters as u64) {
+            let clusters = model.clusters().map(|clusters| clusters as u64);
+            // What is not all there is not read, whatever it claims to be.
+            if let (Ok(clusters), true) = (clusters, model.has_arrays(stage)?) {
                 let distances = format!("verifying the distances of {}", counted(clusters, "cluster"));
                 // As they are read and as they are packed.
                 context.require(&distances, clusters * clusters * 8)?;
@@ -78,7 +78,7 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             }
         }
         Stage::Normals => {
-            report.keep("report of normals", model.report::<normals::Report>(stage))?;
+            report.keep("report of normals", model.report::<NormalsReport>(stage))?;
             report.keep("normals", model.normals())?;
         }
         Stage::Fit => {

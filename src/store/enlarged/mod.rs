@@ -1,23 +1,24 @@
 //! The enlarged index store: the cluster of every texel, I_S [y, x], in square shards; beside it, where the method
 //! knows it, the tile's texel that each texel is, and normals on request.
 
+mod facts;
 pub mod state;
 
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::Lock;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::shape::{Size, Window};
-use crate::store::model::{NARROW, Stage, is_unit};
+use crate::store::model::{NARROW, is_unit};
 use crate::store::origin;
 use crate::zarr::checksums::DIGITS;
-use crate::zarr::metadata::OLDEST_FORMAT;
 use crate::zarr::{Array, DAMAGED, Layout, Named, Store};
+pub use facts::{EnlargeRecipe, Method};
+use facts::{Facts, MOST_CLUSTERS};
 
 /// The attribute `kind` of an enlarged index store.
 pub const KIND: &str = "enlarged";
@@ -28,89 +29,8 @@ pub const SHARD_SIDE: usize = 512;
 /// Side of a chunk in texels.
 pub const CHUNK_SIDE: usize = 128;
 
-/// Longest side of an index, as of every [`Size`] that is given as text.
-const MOST_SIDE: usize = 1 << 24;
-
-/// Most clusters: the index is u16.
-const MOST_CLUSTERS: usize = 1 << 16;
-
 /// The attribute of a finished index that holds the checksums of its shards.
 const CHECKSUMS: &str = "checksums";
-
-/// How an index was enlarged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Nearest normals of a random field, chosen by (25): the paper's. Recipes that name no method mean it.
-    #[default]
-    Paper,
-    /// Source positions that continue their neighbours, from coarse to fine.
-    Coherent,
-    /// The tile again and again.
-    Repeat,
-    /// Tiles of one border, laid at random.
-    Tiles,
-    /// Patches of the tile at random places, stitched on a grid.
-    Roller,
-    /// Image quilting.
-    Quilt,
-}
-
-impl Method {
-    /// The stages of a model that it depends on.
-    pub fn stages(self) -> &'static [Stage] {
-        match self {
-            Self::Paper => &[Stage::Cluster, Stage::Fit],
-            Self::Coherent => &[Stage::Cluster, Stage::Appearance],
-            Self::Repeat | Self::Tiles | Self::Roller | Self::Quilt => &[Stage::Cluster],
-        }
-    }
-}
-
-/// The recipe of an enlarged index, as it is stored.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Recipe {
-    stage: String,
-    /// Version of the method.
-    pub method: u64,
-    /// Digest of the stages of the model.
-    pub model: String,
-    /// Rows and columns.
-    pub size: [usize; 2],
-    /// Seed of all that was drawn at random.
-    pub seed: u64,
-    /// Whether it joins at its borders.
-    pub tileable: bool,
-    /// By what it was enlarged.
-    #[serde(default)]
-    pub rule: Method,
-    /// Whether the source of each texel is kept.
-    #[serde(default)]
-    pub source: bool,
-    /// Whether normals are kept.
-    #[serde(default)]
-    pub keep_normals: bool,
-    /// Nearest normals that were candidates, by the paper's method.
-    pub candidates: Option<usize>,
-    /// Jitter of the coherent rule.
-    pub jitter: Option<u32>,
-    /// Number of tiles, by the method that lays them.
-    pub tiles: Option<usize>,
-}
-
-/// Attributes, as far as they are needed; the seal covers them all.
-#[derive(Deserialize)]
-struct Facts {
-    recipe: Recipe,
-    version: String,
-    #[serde(default)]
-    model_name: Option<String>,
-    /// Number of clusters of the model; not in the oldest layout.
-    clusters: Option<usize>,
-    /// Rows and columns of the tile; not in the oldest layout.
-    tile: Option<[usize; 2]>,
-}
 
 /// An enlarged index store.
 pub struct Enlarged {
@@ -194,14 +114,14 @@ impl Enlarged {
             let wide = document.get("data_type").and_then(Value::as_str) == Some("uint16");
             facts.clusters = Some(if wide { MOST_CLUSTERS } else { NARROW });
         }
-        if recipe.source && facts.tile.is_none() {
+        if recipe.source == Some(true) && facts.tile.is_none() {
             let document = store.array_document("source")?;
             let tile = document.get("attributes").and_then(|attributes| attributes.get("tile"));
             facts.tile = serde_json::from_value(tile.cloned().unwrap_or_default()).ok();
         }
         let wide = facts.clusters.is_some_and(|clusters| clusters > NARROW);
         let index = store.open_array("index", &index_layout(size, wide))?;
-        let source = match (recipe.source, facts.tile) {
+        let source = match (recipe.source == Some(true), facts.tile) {
             (false, _) => None,
             (true, Some([height, width])) => {
                 Some(store.open_array("source", &source_layout(size, Size::new(height, width)))?)
@@ -293,7 +213,7 @@ impl Enlarged {
     }
 
     /// What made it.
-    pub fn recipe(&self) -> &Recipe {
+    pub fn recipe(&self) -> &EnlargeRecipe {
         &self.facts.recipe
     }
 
@@ -467,42 +387,6 @@ impl Enlarged {
         let shard = self.store.path().join(array).join("c");
         let shard = shard.join((y / SHARD_SIDE).to_string()).join((x / SHARD_SIDE).to_string());
         Error::input(format!("{}: {array}: {what}, at row {y}, column {x}", shard.display())).hint(DAMAGED)
-    }
-}
-
-impl Facts {
-    /// Reads the attributes, and checks what does not need arrays.
-    fn read(store: &Store) -> Result<Self> {
-        let refused = |what: String| {
-            Error::input(format!("{}: attributes of btfkit: {what}", store.path().display()))
-                .hint("enlarge anew, under another name")
-        };
-        let attributes = Value::Object(store.expect(KIND)?);
-        let facts: Self = serde_json::from_value(attributes)
-            .map_err(|error| refused(format!("recipe or what lies beside it: {error}")))?;
-        let is_new = store.format() > OLDEST_FORMAT;
-        if is_new && (facts.clusters.is_none() || facts.tile.is_none()) {
-            return Err(refused("clusters or tile: none".to_owned()));
-        }
-        if facts.recipe.stage != "enlarge" {
-            return Err(refused(format!(
-                "recipe: got stage {}, expected enlarge",
-                json!(facts.recipe.stage)
-            )));
-        }
-        if facts.clusters.is_some_and(|clusters| !(1..=MOST_CLUSTERS).contains(&clusters)) {
-            return Err(refused(format!(
-                "clusters: got {:?}, expected 1 to {MOST_CLUSTERS}",
-                facts.clusters
-            )));
-        }
-        let sides = facts.recipe.size.iter().chain(facts.tile.iter().flatten());
-        match sides.clone().find(|side| !(1..=MOST_SIDE).contains(*side)) {
-            None => Ok(facts),
-            Some(side) => {
-                Err(refused(format!("size or tile: got a side of {side}, expected 1 to {MOST_SIDE}")))
-            }
-        }
     }
 }
 

@@ -38,7 +38,7 @@ impl EnlargeState {
     /// That of the output at `output`, if it has begun and is not finished; `digest` is that of the recipe.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where it is another recipe's; when the file is damaged.
+    /// [`crate::ErrorKind::Recipe`] where it is another recipe's; when the file is damaged.
     pub fn read(output: &Path, digest: &str) -> Result<Option<Self>> {
         let file = place(output);
         match MappedFile::open(&file) {
@@ -104,7 +104,7 @@ impl EnlargeState {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
 
     fn digest(text: &str) -> String {
         crate::run::recipe::digest_bytes(text.as_bytes())
@@ -117,7 +117,7 @@ mod tests {
         assert_eq!(EnlargeState::read(folder.path(), &digest("a")).unwrap(), None);
         state.write(folder.path(), &digest("a")).unwrap();
         assert_eq!(EnlargeState::read(folder.path(), &digest("a")).unwrap(), Some(state));
-        assert_eq!(EnlargeState::read(folder.path(), &digest("b")).unwrap_err().kind(), Kind::Recipe);
+        assert_eq!(EnlargeState::read(folder.path(), &digest("b")).unwrap_err().kind(), ErrorKind::Recipe);
         EnlargeState::remove(folder.path()).unwrap();
         EnlargeState::remove(folder.path()).unwrap();
         assert_eq!(EnlargeState::read(folder.path(), &digest("a")).unwrap(), None);

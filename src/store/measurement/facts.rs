@@ -1,20 +1,98 @@
 //! What the attributes of a measurement say that its arrays are read by.
 
-use btfkit_formats::SampleType;
-use serde::Deserialize;
-use serde_json::{Map, Value};
+use btfkit_formats::{Direction, SampleType};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
 
 use super::Description;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::zarr::codec::MOST_CHANNELS;
+use crate::run::recipe::Recipe;
+use crate::zarr::codec::{Chain, MOST_CHANNELS};
 use crate::zarr::metadata::shown;
 use crate::zarr::{SAMPLE_TYPES, Store};
+
+/// What a measurement depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImportRecipe {
+    /// The format of the archive.
+    pub format: String,
+    /// Rows and columns.
+    pub size: [usize; 2],
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Type of the samples.
+    pub samples: String,
+    /// Theta and phi of the views in degrees.
+    pub views: Vec<[f64; 2]>,
+    /// Theta and phi of the lights in degrees.
+    pub lights: Vec<[f64; 2]>,
+    /// Digest of the images.
+    pub images: String,
+    /// How the archive was read; not in the oldest recipes.
+    #[serde(default)]
+    pub reading: Value,
+    /// Transfer curve of the samples.
+    pub transfer: Transfer,
+    /// Reflectance that counts as L* = 100.
+    pub white: f64,
+    /// How chunks are packed.
+    pub codec: String,
+    /// What had to be assumed because the archive does not say it.
+    pub assumptions: Vec<String>,
+}
+
+impl Recipe for ImportRecipe {
+    const STAGE: &'static str = "import";
+}
+
+impl ImportRecipe {
+    /// Of a measurement as it is described; what only the archive says is empty.
+    pub fn of(description: &Description, codec: Chain) -> Self {
+        let degrees = |list: &[Direction]| list.iter().map(|direction| direction.degrees().into()).collect();
+        Self {
+            format: String::new(),
+            size: [description.size.height, description.size.width],
+            channels: description.channels.clone(),
+            samples: description.sample_type.name().to_owned(),
+            views: degrees(&description.views),
+            lights: degrees(&description.lights),
+            images: String::new(),
+            reading: Value::Null,
+            transfer: description.transfer,
+            white: description.white,
+            codec: codec.name().to_owned(),
+            assumptions: Vec::new(),
+        }
+    }
+
+    /// Compares it with what its measurement is.
+    fn check(&self, description: &Description) -> std::result::Result<(), String> {
+        // The codec is not looked at: arrays say themselves how they are packed.
+        let found = Self::of(description, Chain::Stock);
+        let members = [
+            ("size", json!(found.size), json!(self.size)),
+            ("channels", json!(found.channels), json!(self.channels)),
+            ("samples", json!(found.samples), json!(self.samples)),
+            ("transfer", json!(found.transfer), json!(self.transfer)),
+            ("white", json!(found.white), json!(self.white)),
+            ("views", json!(found.views), json!(self.views)),
+            ("lights", json!(found.lights), json!(self.lights)),
+        ];
+        match members.iter().find(|(_, found, expected)| !is_near(found, expected)) {
+            None => Ok(()),
+            Some((name, found, expected)) => {
+                Err(format!("{name}: got {}, the recipe says {}", shown(found), shown(expected)))
+            }
+        }
+    }
+}
 
 /// Attributes of the root, as far as they are needed; the seal covers them all.
 #[derive(Deserialize)]
 pub(super) struct Facts {
-    pub(super) recipe: Map<String, Value>,
+    pub(super) recipe: Value,
     pub(super) digest: String,
     pub(super) transfer: Transfer,
     pub(super) white: f64,
@@ -73,33 +151,11 @@ impl Facts {
         })
     }
 
-    /// Compares what is found with what the import was told, as far as its recipe says so.
-    pub(super) fn check_recipe(&self, description: &Description) -> std::result::Result<(), String> {
-        let degrees = |list: &[btfkit_formats::Direction]| -> Vec<[f64; 2]> {
-            list.iter().map(|d| d.degrees()).map(|(theta, phi)| [theta, phi]).collect()
-        };
-        let size = [description.size.height, description.size.width];
-        for (name, found) in [
-            ("size", serde_json::json!(size)),
-            ("channels", serde_json::json!(description.channels)),
-            ("samples", serde_json::json!(description.sample_type.name())),
-            ("transfer", serde_json::json!(description.transfer)),
-            ("white", serde_json::json!(description.white)),
-            ("views", serde_json::json!(degrees(&description.views))),
-            ("lights", serde_json::json!(degrees(&description.lights))),
-        ] {
-            match self.recipe.get(name) {
-                Some(expected) if !is_near(&found, expected) => {
-                    return Err(format!(
-                        "{name}: got {}, the recipe says {}",
-                        shown(&found),
-                        shown(expected)
-                    ));
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+    /// The recipe of a measurement, which it must fit.
+    pub(super) fn recipe(&self, description: &Description) -> std::result::Result<ImportRecipe, String> {
+        let recipe = ImportRecipe::from_value(&self.recipe).map_err(|what| format!("recipe: {what}"))?;
+        recipe.check(description)?;
+        Ok(recipe)
     }
 }
 

@@ -23,7 +23,8 @@ use serde_json::{Map, Value, json};
 use crate::disk::lock::Lock;
 use crate::disk::temporary;
 use crate::error::{Error, Result};
-use crate::run::{Context, recipe};
+use crate::run::Context;
+use crate::run::recipe::{self, Recipe};
 use crate::shape::{Size, Window};
 use crate::store::directions;
 use crate::zarr::checksums::DIGITS;
@@ -32,6 +33,7 @@ use crate::zarr::{Array, Layout, Named, Store};
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
 use facts::Facts;
+pub use facts::ImportRecipe;
 pub(crate) use write::encoded_bytes;
 
 /// The attribute `kind` of a measurement store.
@@ -57,6 +59,7 @@ pub struct Measurement {
     /// Side of a shard in texels.
     side: usize,
     codec: Chain,
+    recipe: ImportRecipe,
     reflectance: Array,
     luminance: Array,
     /// Of one that is being written.
@@ -67,46 +70,57 @@ impl Measurement {
     /// Starts a measurement, or goes on with one that the same recipe began.
     ///
     /// # Errors
-    /// [`crate::Kind::Recipe`] where another recipe's measurement lies there.
+    /// [`crate::ErrorKind::Recipe`] where another recipe's measurement lies there.
     pub fn create(
         path: &Path,
         description: Description,
         codec: Chain,
-        origin: &Origin<'_>,
+        recipe: ImportRecipe,
+        remarks: &[(String, String)],
         context: &Context<'_>,
     ) -> Result<Self> {
-        Self::create_in_shards(path, description, codec, origin, SHARD_LIMIT_BYTES, context)
+        let side = description.shard_side(SHARD_LIMIT_BYTES);
+        Self::create_in_shards(path, description, (codec, side), recipe, remarks, context)
     }
 
     fn create_in_shards(
         path: &Path,
         description: Description,
-        codec: Chain,
-        origin: &Origin<'_>,
-        limit_bytes: usize,
+        (codec, side): (Chain, usize),
+        recipe: ImportRecipe,
+        remarks: &[(String, String)],
         context: &Context<'_>,
     ) -> Result<Self> {
-        let recipe = origin.recipe;
+        let stored = recipe.to_value()?;
         let mut store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
         let lock = store.begin_by_recipe(
             KIND,
-            recipe,
+            &stored,
             json!({
                 "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
                 "channels": description.channels, "samples": description.sample_type.name(),
-                "assumptions": origin.assumptions, "remarks": origin.remarks,
+                "assumptions": recipe.assumptions, "remarks": remarks,
             }),
             context,
         )?;
         directions::write(&store, "view", &description.views)?;
         directions::write(&store, "light", &description.lights)?;
-        let side = description.shard_side(limit_bytes);
         let reflectance =
             store.create_array("reflectance", &reflectance_layout(&description, codec, side)?)?;
         let luminance = store.create_array("luminance", &luminance_layout(&description, codec, side)?)?;
-        let digest = recipe::digest(recipe);
-        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: Some(lock) })
+        let digest = recipe::digest(&stored);
+        Ok(Self {
+            store,
+            description,
+            recipe,
+            digest,
+            side,
+            codec,
+            reflectance,
+            luminance,
+            _lock: Some(lock),
+        })
     }
 
     /// Opens a measurement for reading; its views may be incomplete.
@@ -141,7 +155,7 @@ impl Measurement {
                 description.n_channels()
             )));
         }
-        facts.check_recipe(&description).map_err(&damaged)?;
+        let recipe = facts.recipe(&description).map_err(&damaged)?;
         let document = store.array_document("reflectance")?;
         let side = shard_side_of(&document, &description).ok_or_else(|| {
             damaged(format!(
@@ -155,7 +169,7 @@ impl Measurement {
         let reflectance = store.check_document("reflectance", &layout, &document)?;
         let luminance = store.open_array("luminance", &luminance_layout(&description, codec, side)?)?;
         let digest = facts.digest;
-        Ok(Self { store, description, digest, side, codec, reflectance, luminance, _lock: None })
+        Ok(Self { store, description, recipe, digest, side, codec, reflectance, luminance, _lock: None })
     }
 
     /// Declares the measurement finished, if all views are there: its root then holds checksums, and the metadata of
@@ -244,6 +258,11 @@ impl Measurement {
     /// Digest of the recipe that made it.
     pub fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// By what it was made.
+    pub fn recipe(&self) -> &ImportRecipe {
+        &self.recipe
     }
 
     /// The attributes of its group: how samples are meant, what was assumed, the recipe.
@@ -358,16 +377,6 @@ impl SampleArray {
     }
 }
 
-/// Where a measurement comes from.
-pub struct Origin<'a> {
-    /// Everything that its bytes depend on.
-    pub recipe: &'a Value,
-    /// What had to be assumed because the archive does not say it.
-    pub assumptions: &'a [String],
-    /// What else the archive says of itself.
-    pub remarks: &'a [(String, String)],
-}
-
 fn reflectance_layout(description: &Description, codec: Chain, side: usize) -> Result<Layout<'static>> {
     let mut layout = sample_layout(description, &REFLECTANCE_AXES, description.n_channels(), side);
     layout.data_type = crate::zarr::data_type_of(description.sample_type);
@@ -464,15 +473,14 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let stop = std::sync::atomic::AtomicBool::new(false);
             let context = Context::new(&crate::run::progress::Silent, &stop, 1, 1 << 30).unwrap();
-            let recipe = json!({"size": [size.height, size.width]});
-            let origin = Origin { recipe: &recipe, assumptions: &[], remarks: &[] };
             let description = description(size, sample_type);
+            let recipe = ImportRecipe::of(&description, Chain::Stock);
             let measurement = Measurement::create_in_shards(
                 folder.path(),
                 description.clone(),
-                Chain::Stock,
-                &origin,
-                limit,
+                (Chain::Stock, description.shard_side(limit)),
+                recipe,
+                &[],
                 &context,
             )
             .unwrap();

@@ -9,11 +9,27 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Map;
 
+use super::{Model, Stage};
 use crate::error::{Error, Result};
 use crate::lattice::{Lattice, WaveCounts};
 use crate::method::coherent::{Appearance, Basis, FEATURES, INPUTS, LEVELS_MOST, dims_of};
+use crate::run::recipe::Recipe;
 use crate::shape::{Size, Window};
 use crate::zarr::{Layout, Store};
+
+/// What an appearance depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AppearanceRecipe {
+    /// Digest of the clusters.
+    pub cluster: String,
+    /// The lattice that was asked for, as on the command line.
+    pub lattice: String,
+}
+
+impl Recipe for AppearanceRecipe {
+    const STAGE: &'static str = Stage::Appearance.name();
+}
 
 /// What the attributes of stage `appearance` say, beside its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,7 +117,25 @@ fn offset_layout(dims: usize) -> Layout<'static> {
     Layout::small::<i32>(&["dim"], &[dims])
 }
 
-pub(super) fn write(store: &Store, appearance: &Appearance) -> Result<()> {
+impl Model {
+    /// Writes how the exemplar looks.
+    pub fn write_appearance(&self, appearance: &Appearance) -> Result<()> {
+        write(&self.store, appearance)
+    }
+
+    /// How the exemplar looks.
+    pub fn appearance(&self) -> Result<Appearance> {
+        let report: AppearanceReport = self.report(Stage::Appearance)?;
+        let tile = self.tile_report()?;
+        let clusters = self.clusters()?;
+        for (name, layout) in arrays(&report, clusters) {
+            self.open_array(Stage::Appearance, &name, &layout)?;
+        }
+        read(&self.store, &report, tile.size(), tile.wraps, clusters)
+    }
+}
+
+fn write(store: &Store, appearance: &Appearance) -> Result<()> {
     store.write_group("appearance", Map::new())?;
     let layout = features_layout(appearance.features.len());
     store.write("appearance/features", &layout, appearance.features.as_flattened())?;
@@ -114,7 +148,7 @@ pub(super) fn write(store: &Store, appearance: &Appearance) -> Result<()> {
 }
 
 /// Reads the appearance of a model of so many clusters, whose tile wraps or does not.
-pub(super) fn read(
+fn read(
     store: &Store,
     report: &AppearanceReport,
     tile: Size,

@@ -11,13 +11,14 @@
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
+use super::{Model, Stage};
 use crate::error::{Error, Result};
 use crate::method::field::fit::car::Prior;
 use crate::method::field::marginals::{Marginals, Matching, NODES};
-use crate::method::field::{Coordinates, Kind, Level, Model, Surface};
-use crate::zarr::metadata::shown;
+use crate::method::field::{self, CarKind, Coordinates, Gains, Level, Surface};
+use crate::run::recipe::Recipe;
 use crate::zarr::{Layout, Store};
 
 /// Farthest site that a stored neighbourhood may have: rows as far back are kept in memory.
@@ -27,11 +28,33 @@ const FARTHEST_SITE: u32 = 64;
 const MOST_SITES: usize = 4096;
 const MOST_LEVELS: usize = 32;
 
+/// What a fit depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitRecipe {
+    /// Digest of the normals.
+    pub normals: String,
+    /// `3d` or `2d`.
+    pub mrf: CarKind,
+    /// Levels of the pyramid, where given.
+    pub levels: Option<usize>,
+    /// What the channels are.
+    pub field: Coordinates,
+    /// How loud each level is.
+    pub gains: Gains,
+    /// What of the tile's distribution is given to a synthesis.
+    pub marginals: Option<Matching>,
+}
+
+impl Recipe for FitRecipe {
+    const STAGE: &'static str = Stage::Fit.name();
+}
+
 /// What the attributes of stage `fit` tell of the field, beside its arrays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FieldReport {
     /// `3d` or `2d`.
-    pub mrf: Kind,
+    pub mrf: CarKind,
     /// What the channels are.
     pub field: Coordinates,
     /// What of the tile's distribution is given to a synthesis.
@@ -95,17 +118,18 @@ impl FieldReport {
 
 impl FieldReport {
     /// Checks the report against the recipe, which decides what is fitted.
-    pub(super) fn check(&self, recipe: &Value) -> std::result::Result<(), String> {
-        for (name, found) in
-            [("mrf", json!(self.mrf)), ("field", json!(self.field)), ("marginals", json!(self.marginals))]
-        {
-            let expected = recipe.get(name).unwrap_or(&Value::Null);
-            if found != *expected {
-                return Err(format!("{name}: got {found}, the recipe says {}", shown(expected)));
+    fn check(&self, recipe: &FitRecipe) -> std::result::Result<(), String> {
+        for (name, found, expected) in [
+            ("mrf", json!(self.mrf), json!(recipe.mrf)),
+            ("field", json!(self.field), json!(recipe.field)),
+            ("marginals", json!(self.marginals), json!(recipe.marginals)),
+        ] {
+            if found != expected {
+                return Err(format!("{name}: got {found}, the recipe says {expected}"));
             }
         }
-        let levels = recipe.get("levels").and_then(Value::as_u64);
-        if levels.is_some_and(|levels| levels != self.levels.len() as u64)
+        let levels = recipe.levels;
+        if levels.is_some_and(|levels| levels != self.levels.len())
             || !(1..=MOST_LEVELS).contains(&self.levels.len())
         {
             return Err(format!("got {} levels, the recipe says {levels:?}", self.levels.len()));
@@ -131,7 +155,7 @@ pub(super) fn arrays(report: &FieldReport) -> Vec<(String, Layout<'static>)> {
         ("mrf/covariance".to_owned(), square_layout(channels)),
         ("mrf/gain".to_owned(), gain_layout(report.levels.len())),
     ];
-    if report.mrf == Kind::Car2d {
+    if report.mrf == CarKind::Car2d {
         arrays.push(("mrf/transform".to_owned(), transform_layout(channels)));
     }
     if report.marginals.is_some() {
@@ -172,21 +196,38 @@ fn marginals_layout() -> Layout<'static> {
     Layout::small::<f32>(&["z1", "z2", "xy"], &[NODES, NODES, 2]).with("z", "-4 to 4 in steps of 1/16")
 }
 
-fn gamma_layout(kind: Kind, channels: usize, sites: usize) -> Layout<'static> {
-    let columns = if kind == Kind::Car3d { channels * sites } else { sites };
+fn gamma_layout(kind: CarKind, channels: usize, sites: usize) -> Layout<'static> {
+    let columns = if kind == CarKind::Car3d { channels * sites } else { sites };
     Layout::small::<f64>(&["field_channel", "coefficient"], &[channels, columns])
 }
 
-fn sigma_layout(kind: Kind, channels: usize) -> Layout<'static> {
-    if kind == Kind::Car3d { square_layout(channels) } else { mean_layout(channels) }
+fn sigma_layout(kind: CarKind, channels: usize) -> Layout<'static> {
+    if kind == CarKind::Car3d { square_layout(channels) } else { mean_layout(channels) }
 }
 
 fn neighbourhood_layout(sites: usize) -> Layout<'static> {
     Layout::small::<i32>(&["site", "dy_dx"], &[sites, 2])
 }
 
+impl Model {
+    /// Writes the random field model under `mrf/`.
+    pub fn write_surface(&self, surface: &Surface) -> Result<()> {
+        write(&self.store, surface)
+    }
+
+    /// The random field model.
+    pub fn surface(&self) -> Result<Surface> {
+        let report: FieldReport = self.report(Stage::Fit)?;
+        report.check(&self.recipe(Stage::Fit)?).map_err(|what| self.damaged_report(Stage::Fit, &what))?;
+        for (name, layout) in arrays(&report) {
+            self.open_array(Stage::Fit, &name, &layout)?;
+        }
+        read(&self.store, &report)
+    }
+}
+
 /// Writes a surface's model under `mrf/`.
-pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
+fn write(store: &Store, surface: &Surface) -> Result<()> {
     let field = &surface.field;
     store.write_group("mrf", Map::new())?;
     let channels = field.channels();
@@ -218,7 +259,7 @@ pub(super) fn write(store: &Store, surface: &Surface) -> Result<()> {
 }
 
 /// Reads a surface's model; `report` is that of stage `fit`.
-pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
+fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
     let (kind, coordinates) = (report.mrf, report.field);
     let channels = report.channels();
     let square = |name: &str, layout: &Layout<'_>| -> Result<DMatrix<f64>> {
@@ -226,7 +267,7 @@ pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
     };
     let mean = store.read_array::<f64>("mrf/mean", &mean_layout(channels))?;
     let transform =
-        (kind == Kind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
+        (kind == CarKind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
     let covariance = square("mrf/covariance", &square_layout(channels))?;
     let gains = store.read_array::<f64>("mrf/gain", &gain_layout(report.levels.len()))?;
     let levels = report
@@ -237,7 +278,7 @@ pub(super) fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
         .map(|(number, (level, gain))| read_level(store, number, gain, kind, channels, level))
         .collect::<Result<Vec<Level>>>()?;
     let autocovariance_error = report.autocovariance_error;
-    let field = Model { kind, mean, transform, levels, covariance, autocovariance_error };
+    let field = field::Model { kind, mean, transform, levels, covariance, autocovariance_error };
     field.check().map_err(|error| {
         error
             .context(store.path().display())
@@ -257,7 +298,7 @@ fn read_level(
     store: &Store,
     number: usize,
     gain: f64,
-    kind: Kind,
+    kind: CarKind,
     channels: usize,
     report: &LevelReport,
 ) -> Result<Level> {

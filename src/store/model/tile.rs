@@ -1,17 +1,42 @@
-//! How a tile was cut, as the attributes of a model say it.
+//! The tile of a model: which measured texels it holds, how it was cut, and the directions that they were measured
+//! under.
 
-use btfkit_formats::SampleType;
+use btfkit_formats::{Direction, SampleType};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
+use super::{Model, Stage};
 use crate::color::Transfer;
+use crate::error::Result;
 use crate::lattice::Lattice;
-use crate::method::tile::Patch;
+use crate::method::tile::{Patch, Tile};
+use crate::method::value::triangulation::triangulate;
+use crate::run::recipe::Recipe;
 use crate::shape::Size;
-use crate::zarr::SAMPLE_TYPES;
+use crate::store::directions;
+use crate::store::measurement::Description;
+use crate::zarr::{Layout, SAMPLE_TYPES};
 
 /// Longest side of a plane.
 const MOST_SIDE: usize = 1 << 24;
+
+/// What a tile depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TileRecipe {
+    /// Digest of the measurement.
+    pub measurement: String,
+    /// What was asked for, as on the command line.
+    pub tile: String,
+    /// Seed of the search.
+    pub seed: u64,
+    /// The lattice that was asked for, where it decides about the tile.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lattice: Option<String>,
+}
+
+impl Recipe for TileRecipe {
+    const STAGE: &'static str = Stage::Tile.name();
+}
 
 /// How a tile was cut.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -60,7 +85,7 @@ impl TileReport {
     }
 
     /// Checks the parts against each other and against the recipe.
-    pub(super) fn check(&self, recipe: &Value) -> Result<(), String> {
+    pub(super) fn check(&self, recipe: &TileRecipe) -> std::result::Result<(), String> {
         let sides = self.size.iter().chain(&self.measurement_size);
         if !sides.clone().all(|side| (1..=MOST_SIDE).contains(side)) {
             return Err(format!("got sides {:?}, expected 1 to {MOST_SIDE}", sides.collect::<Vec<_>>()));
@@ -77,15 +102,132 @@ impl TileReport {
             }
             _ => {}
         }
-        let asked = recipe.get("tile").and_then(Value::as_str).unwrap_or_default();
-        let wraps = match asked {
+        let wraps = match recipe.tile.as_str() {
             "none" => Some(false),
             "periodic" => Some(true),
             _ => None,
         };
         if wraps.is_some_and(|wraps| wraps != self.wraps) {
-            return Err(format!("wraps: got {}, the recipe says tile {asked}", self.wraps));
+            return Err(format!("wraps: got {}, the recipe says tile {}", self.wraps, recipe.tile));
         }
         Ok(())
     }
+}
+
+/// The arrays of a tile.
+pub(super) fn arrays(
+    report: &TileReport,
+    directions: &[Vec<Direction>; 2],
+    format: u64,
+) -> Vec<(String, Layout<'static>)> {
+    let mut arrays = vec![("tile_source".to_owned(), tile_layout(report.size()))];
+    for (dimension, directions) in ["view", "light"].into_iter().zip(directions) {
+        arrays.extend(directions::layouts(dimension, directions.len(), format));
+        let count = triangulate(directions).len();
+        arrays.push((format!("{dimension}_triangles"), triangle_layout(dimension, count)));
+    }
+    arrays
+}
+
+impl Model {
+    /// How the tile was cut.
+    ///
+    /// # Errors
+    /// Where there is no tile yet, or its parts do not fit together.
+    pub fn tile_report(&self) -> Result<TileReport> {
+        let report: TileReport = self.report(Stage::Tile)?;
+        report.check(&self.recipe(Stage::Tile)?).map_err(|what| self.damaged_report(Stage::Tile, &what))?;
+        Ok(report)
+    }
+
+    /// Writes the directions of the measurement and their triangulations.
+    pub fn write_directions(&self, description: &Description) -> Result<()> {
+        for (dimension, directions) in [("view", &description.views), ("light", &description.lights)] {
+            directions::write(&self.store, dimension, directions)?;
+            let triangles = triangulate(directions);
+            let corners: Vec<u16> = triangles.iter().flatten().copied().collect();
+            let layout = triangle_layout(dimension, triangles.len());
+            self.store.write(&format!("{dimension}_triangles"), &layout, &corners)?;
+        }
+        Ok(())
+    }
+
+    /// View directions and light directions.
+    pub fn directions(&self) -> Result<[Vec<Direction>; 2]> {
+        Ok([directions::read(&self.store, "view")?, directions::read(&self.store, "light")?])
+    }
+
+    /// Checks that the coordinates by which other programs select are the directions.
+    ///
+    /// # Errors
+    /// Where they are not.
+    pub fn check_coordinates(&self) -> Result<()> {
+        for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
+            directions::check_coordinates(&self.store, dimension, &directions)?;
+        }
+        Ok(())
+    }
+
+    /// Triangles of the views and of the lights: numbers of three directions each.
+    ///
+    /// # Errors
+    /// Where they are not the spherical Delaunay triangles of the directions.
+    pub fn triangles(&self) -> Result<[Vec<[u16; 3]>; 2]> {
+        let [views, lights] = self.directions()?;
+        let read = |dimension: &str, directions: &[Direction]| -> Result<Vec<[u16; 3]>> {
+            let expected = triangulate(directions);
+            let name = format!("{dimension}_triangles");
+            let corners =
+                self.read::<u16>(Stage::Tile, &name, &triangle_layout(dimension, expected.len()))?;
+            if corners != *expected.as_flattened() {
+                return Err(self.damaged(&name, &format!("not the triangles of the {dimension} directions")));
+            }
+            Ok(expected)
+        };
+        Ok([read("view", &views)?, read("light", &lights)?])
+    }
+
+    /// Writes which measured texel each tile texel is, [y, x, 2].
+    pub fn write_tile(&self, tile: &Tile) -> Result<()> {
+        let coordinates: Vec<u32> = tile.source.iter().flatten().copied().collect();
+        self.store.write("tile_source", &tile_layout(tile.size), &coordinates)
+    }
+
+    /// The tile.
+    pub fn tile(&self) -> Result<Tile> {
+        let report = self.tile_report()?;
+        let coordinates = self.read::<u32>(Stage::Tile, "tile_source", &tile_layout(report.size()))?;
+        let source: Vec<[u32; 2]> = coordinates.chunks_exact(2).map(|c| [c[0], c[1]]).collect();
+        self.expect_measured("tile_source", &source, &report)?;
+        Ok(Tile { size: report.size(), source, wraps: report.wraps })
+    }
+
+    /// Checks that texels lie in the measurement.
+    pub(super) fn expect_measured(
+        &self,
+        array: &str,
+        source: &[[u32; 2]],
+        report: &TileReport,
+    ) -> Result<()> {
+        let [rows, columns] = report.measurement_size;
+        let beyond = |[row, column]: &&[u32; 2]| *row as usize >= rows || *column as usize >= columns;
+        match source.iter().find(beyond) {
+            None => Ok(()),
+            Some([row, column]) => Err(self.damaged(
+                array,
+                &format!("row {row}, column {column} lie outside the measurement of {columns}x{rows}"),
+            )),
+        }
+    }
+}
+
+fn tile_layout(size: Size) -> Layout<'static> {
+    Layout::small::<u32>(&["y", "x", "row_column"], &[size.height, size.width, 2])
+}
+
+fn triangle_layout(dimension: &str, count: usize) -> Layout<'static> {
+    // A name for each list: other programs take one length for one name.
+    let names: &[&str] =
+        if dimension == "view" { &["view_triangle", "corner"] } else { &["light_triangle", "corner"] };
+    Layout::small::<u16>(names, &[count, 3])
 }

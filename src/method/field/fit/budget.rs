@@ -4,7 +4,7 @@ use super::car::Positions;
 use super::neighbourhood;
 use super::spectrum::MOST_LEVELS;
 use crate::error::{Error, Result};
-use crate::method::field::model::{Kind, Options};
+use crate::method::field::model::{CarKind, Options};
 use crate::method::field::pyramid;
 
 /// Scalars of data that each scalar of a model should rest on.
@@ -44,10 +44,10 @@ pub(super) fn most_levels(size: [usize; 2], channels: usize, options: &Options) 
 }
 
 /// Channels that one model of this kind has.
-pub(super) fn joint_channels(kind: Kind, channels: usize) -> usize {
+pub(super) fn joint_channels(kind: CarKind, channels: usize) -> usize {
     match kind {
-        Kind::Car3d => channels,
-        Kind::Car2d => 1,
+        CarKind::Car3d => channels,
+        CarKind::Car2d => 1,
     }
 }
 
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
     use crate::method::field::{Boundary, Gains};
 
-    fn options(kind: Kind, levels: Option<usize>) -> Options {
+    fn options(kind: CarKind, levels: Option<usize>) -> Options {
         Options { kind, levels, gains: Gains::None, boundary: Boundary::Periodic }
     }
 
@@ -83,19 +83,19 @@ mod tests {
         let chosen =
             |side, channels, kind| most_levels([side, side], channels, &options(kind, None)).unwrap();
         // 3D, three channels: 42 parameters need 140 texels. Scalar: 5 parameters need 50.
-        assert_eq!(chosen(64, 3, Kind::Car3d), 3);
-        assert_eq!(chosen(64, 3, Kind::Car2d), 4);
-        assert_eq!(chosen(1024, 3, Kind::Car3d), MOST_CHOSEN_LEVELS);
-        assert_eq!(chosen(8, 3, Kind::Car3d), 1);
+        assert_eq!(chosen(64, 3, CarKind::Car3d), 3);
+        assert_eq!(chosen(64, 3, CarKind::Car2d), 4);
+        assert_eq!(chosen(1024, 3, CarKind::Car3d), MOST_CHOSEN_LEVELS);
+        assert_eq!(chosen(8, 3, CarKind::Car3d), 1);
         // Mirrored, 16 x 14 texels, less one row and two columns: 180 inner ones, but 42 at the next level.
-        let mirrored = Options { boundary: Boundary::Mirrored, ..options(Kind::Car3d, None) };
+        let mirrored = Options { boundary: Boundary::Mirrored, ..options(CarKind::Car3d, None) };
         assert_eq!(most_levels([16, 14], 3, &mirrored).unwrap(), 1);
         assert_eq!(balance([16, 14], 3, &neighbourhood::nested()[1], &mirrored), (540, 42));
     }
 
     #[test]
     fn levels_asked_for_end_at_one_texel() {
-        let asked = |levels| most_levels([9, 16], 1, &options(Kind::Car3d, Some(levels)));
+        let asked = |levels| most_levels([9, 16], 1, &options(CarKind::Car3d, Some(levels)));
         assert_eq!(asked(5).unwrap(), 5);
         assert!(asked(6).is_err() && asked(0).is_err());
     }

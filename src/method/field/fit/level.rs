@@ -1,9 +1,9 @@
-//! The field of one band: the causal neighbourhood of the highest evidence that the band can carry and that gives a stable
-//! field, and its estimates.
+//! The field of one band: the causal neighbourhood of the highest evidence that the band can carry and that gives a
+//! stable field, and its estimates.
 
 use nalgebra::DMatrix;
 
-use super::super::model::{Kind, Level, Options};
+use super::super::model::{CarKind, Level, Options};
 use super::super::raster::{Boundary, Field};
 use super::budget::{affords, balance, joint_channels};
 use super::car::{Moments, Positions, Posterior, Prior};
@@ -31,8 +31,8 @@ pub(super) fn fit_level(band: &Field, options: &Options) -> Result<Level> {
     let joint = joint_channels(options.kind, band.channels);
     let prior = Prior::weak(band.second_moments().trace() / band.channels as f64, joint);
     let parts: Vec<Field> = match options.kind {
-        Kind::Car3d => vec![band],
-        Kind::Car2d => (0..band.channels).map(|channel| band.channel(channel)).collect(),
+        CarKind::Car3d => vec![band],
+        CarKind::Car2d => (0..band.channels).map(|channel| band.channel(channel)).collect(),
     };
     let evidence = log_evidence(&parts, &sets, &prior, options.boundary)?;
     // The first of the highest: ties go to the smaller set.
@@ -61,7 +61,7 @@ pub(super) fn fit_level(band: &Field, options: &Options) -> Result<Level> {
 }
 
 /// The estimates for one neighbourhood; size and evidence are left to the caller.
-fn estimate(moments: &[Moments], set: &[[i32; 2]], prior: &Prior, kind: Kind) -> Result<Level> {
+fn estimate(moments: &[Moments], set: &[[i32; 2]], prior: &Prior, kind: CarKind) -> Result<Level> {
     let posteriors = moments.iter().map(|m| Posterior::new(m, prior)).collect::<Result<Vec<_>>>()?;
     let gamma = stacked(&posteriors.iter().map(|p| p.gamma.clone()).collect::<Vec<_>>());
     let sigma = stacked(&posteriors.iter().map(Posterior::sigma).collect::<Vec<_>>());
@@ -110,7 +110,7 @@ fn stacked(parts: &[DMatrix<f64>]) -> DMatrix<f64> {
 }
 
 /// Scales Gamma until the field is stable, with the noise that the data then leave unexplained.
-fn damp(level: &mut Level, moments: &[Moments], kind: Kind) -> Result<()> {
+fn damp(level: &mut Level, moments: &[Moments], kind: CarKind) -> Result<()> {
     while level.radius >= STABLE_RADIUS {
         level.gamma *= DAMPING;
         level.radius = level.measure_radius(kind)?;

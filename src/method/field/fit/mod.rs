@@ -13,7 +13,7 @@ mod spectrum;
 pub mod stability;
 
 use super::karhunen_loeve;
-use super::model::{Kind, Model, Options};
+use super::model::{CarKind, Model, Options};
 use super::raster::Field;
 use choice::{Choice, Fitted};
 
@@ -42,8 +42,8 @@ pub fn fit(field: &Field, options: &Options) -> Result<Model> {
     }
     let (centred, mean) = field.centred();
     let (centred, transform) = match options.kind {
-        Kind::Car3d => (centred, None),
-        Kind::Car2d => {
+        CarKind::Car3d => (centred, None),
+        CarKind::Car2d => {
             let transform = karhunen_loeve::transform(&centred)?;
             (karhunen_loeve::project(&centred, &transform), Some(transform))
         }
@@ -81,7 +81,7 @@ pub(super) mod tests {
     use crate::random::Hash;
 
     const OPTIONS: Options =
-        Options { kind: Kind::Car3d, levels: None, gains: Gains::None, boundary: Boundary::Periodic };
+        Options { kind: CarKind::Car3d, levels: None, gains: Gains::None, boundary: Boundary::Periodic };
 
     /// Noise smoothed twice by a periodic kernel: a random field that has every scale up to some texels.
     fn smooth(height: usize, width: usize, channels: usize) -> Field {
@@ -104,7 +104,7 @@ pub(super) mod tests {
         for channels in 1..=4 {
             let field = smooth(48, 48, channels);
             for boundary in [Boundary::Periodic, Boundary::Mirrored] {
-                let [joint, scalar] = [Kind::Car3d, Kind::Car2d].map(|kind| {
+                let [joint, scalar] = [CarKind::Car3d, CarKind::Car2d].map(|kind| {
                     let model = fit(&field, &Options { kind, levels: Some(2), boundary, ..OPTIONS }).unwrap();
                     model.check().unwrap();
                     assert_eq!([model.levels[0].size, model.levels[1].size], [[48, 48], [24, 24]]);
@@ -129,7 +129,7 @@ pub(super) mod tests {
         let sites = [[0, 1], [1, 0], [1, -1], [1, 1]];
         // Joint: two channels that feed each other. Scalar: the same sites, one row a channel.
         let joint = single(
-            Kind::Car3d,
+            CarKind::Car3d,
             &sites,
             &[
                 0.5, 0.1, 0.3, 0.0, 0.1, -0.05, -0.1, 0.0, //
@@ -137,7 +137,7 @@ pub(super) mod tests {
             ],
             &[1.0, 0.4, 0.4, 0.5],
         );
-        let scalar = single(Kind::Car2d, &sites, &[0.5, 0.3, 0.1, -0.1, 0.2, -0.4, 0.1, 0.3], &[1.0, 0.3]);
+        let scalar = single(CarKind::Car2d, &sites, &[0.5, 0.3, 0.1, -0.1, 0.2, -0.4, 0.1, 0.3], &[1.0, 0.3]);
         for truth in [joint, scalar] {
             let field = synthesised(&truth, 4, 400, 400);
             let options =
@@ -165,7 +165,7 @@ pub(super) mod tests {
     #[test]
     fn every_level_of_a_synthesis_has_the_variance_of_the_data() {
         let field = smooth(128, 128, 3);
-        for kind in [Kind::Car3d, Kind::Car2d] {
+        for kind in [CarKind::Car3d, CarKind::Car2d] {
             let model = fit(&field, &Options { kind, levels: Some(3), ..OPTIONS }).unwrap();
             let centred = field.centred().0;
             let data =
@@ -189,7 +189,7 @@ pub(super) mod tests {
     fn gains_make_up_for_what_independent_levels_lose() {
         let field = smooth(128, 128, 2);
         let expected = field.centred().0.second_moments();
-        for kind in [Kind::Car3d, Kind::Car2d] {
+        for kind in [CarKind::Car3d, CarKind::Car2d] {
             let [plain, matched] = [Gains::None, Gains::Matched].map(|gains| {
                 let model = fit(&field, &Options { kind, levels: Some(3), gains, ..OPTIONS }).unwrap();
                 let made = synthesised(&model, 1, 512, 512).centred().0.second_moments();
@@ -232,7 +232,7 @@ pub(super) mod tests {
 
     #[test]
     fn an_unstable_neighbourhood_is_shrunk_and_at_last_damped_and_the_model_says_so() {
-        for kind in [Kind::Car3d, Kind::Car2d] {
+        for kind in [CarKind::Car3d, CarKind::Car2d] {
             let options = Options { kind, levels: Some(1), boundary: Boundary::Mirrored, ..OPTIONS };
             // The growth shows to sets with the upper right neighbour only, which begin at four.
             let shrunk = fit(&exploding(1), &options).unwrap();
@@ -255,7 +255,7 @@ pub(super) mod tests {
     #[test]
     fn a_constant_field_has_a_model_of_nothing_but_its_mean() {
         let field = Field::new(16, 16, 3, [0.1, 0.2, 0.9].repeat(256)).unwrap();
-        for kind in [Kind::Car3d, Kind::Car2d] {
+        for kind in [CarKind::Car3d, CarKind::Car2d] {
             let model = fit(&field, &Options { kind, ..OPTIONS }).unwrap();
             let copy = synthesised(&model, 1, 5, 5);
             assert!(copy.samples.iter().zip(&field.samples).all(|(a, b)| (a - b).abs() < 1e-7));

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::neighbourhood::reach;
 use super::second_order::{Autocovariance, Lags};
 use crate::error::{Error, Result};
-use crate::method::field::model::{Kind, Level};
+use crate::method::field::model::{CarKind, Level};
 
 /// Fewest and most frequencies along each axis of a level's lattice. A sum over N of them is the covariance of a field
 /// that repeats every N texels, so N must be some times as far as a disturbance reaches, which the radius tells.
@@ -44,7 +44,7 @@ impl Share {
     /// [`MOST_LEVELS`]).
     pub(super) fn of(
         level: &Level,
-        kind: Kind,
+        kind: CarKind,
         number: usize,
         most_levels: usize,
         lags: Lags,
@@ -224,7 +224,7 @@ mod tests {
     fn model() -> Model {
         let sites = [[0, 1], [1, 0], [1, -1]];
         single(
-            Kind::Car3d,
+            CarKind::Car3d,
             &sites,
             &[0.5, 0.1, 0.3, 0.0, 0.1, -0.05, -0.2, 0.4, 0.1, 0.3, 0.0, 0.1],
             &[1.0, 0.4, 0.4, 0.5],
@@ -246,7 +246,7 @@ mod tests {
         let level = &model().levels[0];
         let lags = Lags { rows: 3, columns: 3 };
         for number in [0, 1, 2] {
-            let share = Share::of(level, Kind::Car3d, number, 3, lags).unwrap();
+            let share = Share::of(level, CarKind::Car3d, number, 3, lags).unwrap();
             let (field, _) = alone(level, number).centred();
             let found = Autocovariance::of_field(&field, Boundary::Mirrored, lags);
             let error = share.autocovariance.error(&found);

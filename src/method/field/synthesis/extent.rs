@@ -13,15 +13,15 @@ pub enum Extent {
     Endless,
     /// The field itself again, in both directions: row `height` is row 0, column `width` is column 0.
     ///
-    /// Levels are rings of their own: level k has its noise at row modulo `height / 2^k`, column modulo `width / 2^k`, so
-    /// both must be multiples of 2^(levels - 1). Rows are generated from so far above the first that the zero start has
-    /// decayed to 1e-7: rows `height` and after would be rows 0 and after to that, and to what f32 rounds. Along a row the
-    /// same holds for columns.
+    /// Levels are rings of their own: level k has its noise at row modulo `height / 2^k`, column modulo `width / 2^k`,
+    /// so both must be multiples of 2^(levels - 1). Rows are generated from so far above the first that the zero start
+    /// has decayed to 1e-7: rows `height` and after would be rows 0 and after to that, and to what f32 rounds. Along a
+    /// row the same holds for columns.
     Wrapping,
 }
 
-/// What is left of the zero state after the margin of an endless field: in variance a 2500th. A model is stable, so that
-/// takes 977 rows at most.
+/// What is left of the zero state after the margin of an endless field: in variance a 2500th. A model is stable, so
+/// that takes 977 rows at most.
 const TRANSIENT: f64 = 0.02;
 
 /// What is left of it where a field wraps: below what f32 keeps, so however long that takes (a model is stable, so 4022
@@ -35,7 +35,7 @@ const MOST_TEXELS: usize = 1 << 30;
 
 /// One level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct Offset {
     /// What is generated.
     pub grid: Grid,
     /// The first row that counts.
@@ -46,9 +46,9 @@ pub(super) struct Place {
     pub width: usize,
 }
 
-/// The levels of a field of `height` x `width` texels, the finest first. Each reaches a little farther than the one before,
-/// so that the expansion meets no border.
-pub(super) fn places(model: &Model, height: usize, width: usize, extent: Extent) -> Result<Vec<Place>> {
+/// The levels of a field of `height` x `width` texels, the finest first. Each reaches a little farther than the one
+/// before, so that the expansion meets no border.
+pub(super) fn places(model: &Model, height: usize, width: usize, extent: Extent) -> Result<Vec<Offset>> {
     if !(1..=MOST_TEXELS).contains(&height) || !(1..=MOST_TEXELS).contains(&width) {
         return Err(Error::usage(format!(
             "a field of {height} x {width} texels: each side must lie between 1 and {MOST_TEXELS}"
@@ -79,7 +79,7 @@ pub(super) fn places(model: &Model, height: usize, width: usize, extent: Extent)
                 ring: Some(Ring { height: height >> k, lead: lead(level, model)? }),
             },
         };
-        places.push(Place { grid, first_row, first_column, width: columns });
+        places.push(Offset { grid, first_row, first_column, width: columns });
         // What the expansion at the first place reads, and from an even column on.
         first_row = first_row.div_euclid(2) - 1;
         first_column = (first_column / 2 - 1).div_euclid(2) * 2;
@@ -89,9 +89,9 @@ pub(super) fn places(model: &Model, height: usize, width: usize, extent: Extent)
 }
 
 /// Bytes of the rows that all levels keep.
-pub(super) fn memory_bytes(model: &Model, places: &[Place]) -> u64 {
+pub(super) fn memory_bytes(model: &Model, places: &[Offset]) -> u64 {
     let channels = model.channels();
-    let bytes = |(n, (place, level)): (usize, (&Place, &Level))| {
+    let bytes = |(n, (place, level)): (usize, (&Offset, &Level))| {
         let coarser = if n + 1 < places.len() { 3 } else { 0 };
         let row = (place.width * channels * size_of::<f32>()) as u64;
         car::Field::bytes(channels, &level.neighbourhood, place.grid.width) + (1 + coarser) * row
@@ -131,7 +131,7 @@ fn lead(level: &Level, model: &Model) -> Result<usize> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::method::field::Kind;
+    use crate::method::field::CarKind;
     use crate::method::field::model::tests::single;
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn levels_reach_farther_than_the_expansion_and_begin_on_even_columns() {
-        let mut model = single(Kind::Car3d, &[[0, 1], [1, 0]], &[0.5, 0.3], &[1.0]);
+        let mut model = single(CarKind::Car3d, &[[0, 1], [1, 0]], &[0.5, 0.3], &[1.0]);
         model.levels = vec![model.levels[0].clone(); 4];
         for (extent, width) in [(Extent::Endless, 41), (Extent::Wrapping, 40)] {
             let places = places(&model, 24, width, extent).unwrap();
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn sizes_that_do_not_halve_cannot_wrap() {
-        let mut model = single(Kind::Car3d, &[[0, 1]], &[0.5], &[1.0]);
+        let mut model = single(CarKind::Car3d, &[[0, 1]], &[0.5], &[1.0]);
         model.levels = vec![model.levels[0].clone(); 3];
         assert!(places(&model, 8, 12, Extent::Wrapping).is_ok());
         for (height, width) in [(8, 13), (10, 12)] {

@@ -1,9 +1,9 @@
 //! Synthesis of a field of any size, row by row in bounded memory: (9) or (18) at each level, the collapse of the
 //! pyramid, (24) and the mean.
 //!
-//! Texel 2r of a level lies on texel r of the next. Each level begins from zeros a margin earlier, which is thrown away:
-//! as many texels as the stability radius takes to bring a disturbance below 1e-3, at least 16, at most 256 (top, left
-//! and right); where the field wraps, as [`Extent::Wrapping`] says.
+//! Texel 2r of a level lies on texel r of the next. Each level begins from zeros a margin earlier, which is thrown
+//! away: as many texels as the stability radius takes to bring a disturbance below 1e-3, at least 16, at most 256 (top,
+//! left and right); where the field wraps, as [`Extent::Wrapping`] says.
 //!
 //! All is f32, summed in one order (`kernel::car`, `kernel::collapse`): no kernel and no machine changes a bit.
 
@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::kernel::{Kernel, collapse};
 use crate::random::Hash;
 pub use extent::Extent;
-use extent::Place;
+use extent::Offset;
 use torus::Lattice;
 
 /// Domain of the noise of level 0; level k has this plus k.
@@ -44,14 +44,14 @@ pub struct Synthesis {
 struct Stage {
     lattice: Lattice,
     kernel: Kernel,
-    place: Place,
+    place: Offset,
     channels: usize,
     /// The newest row of the sum, planar.
     sum: Vec<f32>,
     /// Lattice row of the next.
     next_row: i32,
-    /// Three successive rows of the coarser sum, expanded to the columns of this level, the oldest in front; none at the
-    /// coarsest level.
+    /// Three successive rows of the coarser sum, expanded to the columns of this level, the oldest in front; none at
+    /// the coarsest level.
     coarser: VecDeque<Vec<f32>>,
     /// Lattice row of the newest of them.
     coarser_row: i32,

@@ -4,13 +4,13 @@ use nalgebra::DMatrix;
 use super::*;
 use crate::method::field::model::tests::single;
 use crate::method::field::raster::{Boundary, Field};
-use crate::method::field::{Kind, pyramid};
+use crate::method::field::{CarKind, pyramid};
 
 /// Three levels of two channels with different fields.
 fn model() -> Model {
     let sites = [[0, 1], [1, 0], [1, -1]];
     let gamma = [0.5, 0.1, 0.3, 0.0, 0.1, -0.05, -0.2, 0.4, 0.1, 0.3, 0.0, 0.1];
-    let mut model = single(Kind::Car3d, &sites, &gamma, &[1.0, 0.4, 0.4, 0.5]);
+    let mut model = single(CarKind::Car3d, &sites, &gamma, &[1.0, 0.4, 0.4, 0.5]);
     model.mean = vec![0.25, -3.0];
     for factor in [0.9, -0.7] {
         let mut level = model.levels[0].clone();
@@ -160,7 +160,7 @@ fn the_streamed_collapse_is_that_of_the_pyramid() {
 }
 
 fn scalar() -> Model {
-    let mut model = single(Kind::Car2d, &[[0, 1], [1, 1]], &[0.5, 0.2, -0.4, 0.5], &[4.0, 1.0]);
+    let mut model = single(CarKind::Car2d, &[[0, 1], [1, 1]], &[0.5, 0.2, -0.4, 0.5], &[4.0, 1.0]);
     model.transform = Some(DMatrix::from_row_slice(2, 2, &[0.6, 0.8, -0.8, 0.6]));
     model.levels.push(model.levels[0].clone());
     model
@@ -190,7 +190,7 @@ fn moments(samples: &[f64]) -> [f64; 2] {
 #[test]
 fn a_long_field_neither_fades_nor_drifts_and_its_edges_are_like_its_middle() {
     // Separable with a = b = 0.8: variance 1 / (1 - 0.64)^2. The sum of two levels, of which the coarser has a tenth.
-    let mut model = single(Kind::Car3d, &[[0, 1], [1, 0], [1, 1]], &[0.8, 0.8, -0.64], &[1.0]);
+    let mut model = single(CarKind::Car3d, &[[0, 1], [1, 0], [1, 1]], &[0.8, 0.8, -0.64], &[1.0]);
     let (height, width, part) = (65536, 64, 1000);
     let mut synthesis = endless(&model, 8, height, width);
     let first = pulled(&mut synthesis, part);
@@ -298,7 +298,7 @@ fn columns_of_a_wrapping_field_are_generated_across_the_seam() {
 /// Laid side by side, a smooth field shows no step where its copies meet.
 #[test]
 fn the_seams_of_a_wrapping_field_are_as_smooth_as_its_middle() {
-    let mut model = single(Kind::Car3d, &[[0, 1], [1, 0], [1, 1]], &[0.95, 0.95, -0.9025], &[1.0]);
+    let mut model = single(CarKind::Car3d, &[[0, 1], [1, 0], [1, 1]], &[0.95, 0.95, -0.9025], &[1.0]);
     model.levels.push(model.levels[0].clone());
     let (height, width) = (128, 160);
     let field = pulled(&mut wrapping(&model, 2, height, width), height);

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::kernel::car::{Coefficients, Ends, Field};
 use crate::method::field::fit::car::cholesky;
-use crate::method::field::model::{Kind, Level};
+use crate::method::field::model::{CarKind, Level};
 use crate::random::Hash;
 
 /// Rows and columns of a lattice.
@@ -16,8 +16,8 @@ pub(super) struct Grid {
     pub first_column: i32,
     /// Columns.
     pub width: usize,
-    /// Rows after which the noise comes again, and texels that the recursion along a row sets out before the first, where
-    /// rows are rings.
+    /// Rows after which the noise comes again, and texels that the recursion along a row sets out before the first,
+    /// where rows are rings.
     pub ring: Option<Ring>,
 }
 
@@ -28,8 +28,8 @@ pub(super) struct Ring {
     pub lead: usize,
 }
 
-/// Generates rows of Y_r = Gamma X_r + e_r, e_r = L z_r with L L^T = Sigma, from the zero state. The normals z are hashed
-/// from row, column and channel.
+/// Generates rows of Y_r = Gamma X_r + e_r, e_r = L z_r with L L^T = Sigma, from the zero state. The normals z are
+/// hashed from row, column and channel.
 pub(super) struct Lattice {
     /// One field of all channels, or (2D) one of each.
     parts: Vec<Field>,
@@ -41,7 +41,7 @@ pub(super) struct Lattice {
 
 impl Lattice {
     /// The field of `level`. The noise of a texel depends on `hash` and its place on the lattice only.
-    pub(super) fn new(level: &Level, kind: Kind, hash: Hash, grid: Grid, kernel: Kernel) -> Result<Self> {
+    pub(super) fn new(level: &Level, kind: CarKind, hash: Hash, grid: Grid, kernel: Kernel) -> Result<Self> {
         let ends = grid.ring.map_or(Ends::Open, |ring| Ends::Ring { lead: ring.lead });
         let sites = &level.neighbourhood;
         let field = |channels, gamma: &[f64], factor: &[f64]| {
@@ -49,13 +49,13 @@ impl Lattice {
         };
         let channels = level.gamma.nrows();
         let parts = match kind {
-            Kind::Car3d => {
+            CarKind::Car3d => {
                 // Columns of Gamma run over the sites, then the channels from which; its transpose lies row by row.
                 let block = |s| level.gamma.columns(s * channels, channels).transpose();
                 let gamma: Vec<f64> = (0..sites.len()).flat_map(|s| block(s).as_slice().to_vec()).collect();
                 vec![field(channels, &gamma, cholesky(level.noise_covariance())?.l().transpose().as_slice())]
             }
-            Kind::Car2d => {
+            CarKind::Car2d => {
                 let of = |channel| {
                     let gamma: Vec<f64> = level.gamma.row(channel).iter().copied().collect();
                     field(1, &gamma, &[level.noise_covariance()[(channel, 0)].sqrt()])

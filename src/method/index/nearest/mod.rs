@@ -4,26 +4,26 @@
 //! Unit vectors with z > 0 look a few candidates up by (x, y) and rank them; all other queries, and those where the
 //! candidates would be too many, go to a k-d tree.
 
+mod duplicates;
 mod leaves;
 mod search;
 mod square;
 pub mod tree;
-mod twins;
 
 use crate::kernel::Kernel;
 use crate::kernel::ranking::{BATCH, RANKS};
+use duplicates::Duplicates;
 use leaves::Leaves;
 use search::Search;
 use tree::{Neighbour, Tree};
-use twins::Twins;
 
-/// Bytes of twins and tree for each texel, at most.
+/// Bytes of duplicates and tree for each texel, at most.
 const TEXEL_BYTES: usize = 64;
 
 /// Normals of a tile, ready to be searched.
 pub struct NearestNormals {
     /// None if no two normals are equal.
-    twins: Option<Twins>,
+    duplicates: Option<Duplicates>,
     /// Over the distinct normals.
     tree: Tree,
     /// None if more neighbours are wanted than can be ranked.
@@ -36,23 +36,23 @@ impl NearestNormals {
     /// Over the normals of a tile, whose order gives the texel numbers, for the `count` nearest. Works in parallel;
     /// what is found depends on neither threads nor kernel.
     pub fn new(normals: &[[f32; 3]], count: usize, kernel: Kernel) -> Self {
-        let twins = Twins::new(normals, count);
-        let points: Vec<_> = twins.normals.iter().copied().zip(0..).collect();
+        let duplicates = Duplicates::new(normals, count);
+        let points: Vec<_> = duplicates.normals.iter().copied().zip(0..).collect();
         let tree = Tree::new(points.clone());
-        let leaves = (1..=RANKS)
-            .contains(&count)
-            .then(|| Leaves::new(&points, &Search { normals: &twins.normals, tree: &tree, count, kernel }));
-        Self { twins: (!twins.are_none()).then_some(twins), tree, leaves, count, kernel }
+        let leaves = (1..=RANKS).contains(&count).then(|| {
+            Leaves::new(&points, &Search { normals: &duplicates.normals, tree: &tree, count, kernel })
+        });
+        Self { duplicates: (!duplicates.are_none()).then_some(duplicates), tree, leaves, count, kernel }
     }
 
     /// Finds the nearest normals of each query: `found` is [query, rank], texel numbers, nearest first. There must be
     /// as many normals as ranks.
     pub fn find_row(&self, queries: &[[f32; 3]], found: &mut [u32]) {
         self.find_distinct(queries, found);
-        let Some(twins) = self.twins.as_ref().filter(|_| self.count > 0) else { return };
+        let Some(duplicates) = self.duplicates.as_ref().filter(|_| self.count > 0) else { return };
         let mut buffer = Vec::new();
         for (&query, found) in queries.iter().zip(found.chunks_exact_mut(self.count)) {
-            twins.tell_apart(query, found, &mut buffer);
+            duplicates.tell_apart(query, found, &mut buffer);
         }
     }
 
@@ -115,7 +115,7 @@ impl NearestNormals {
 
     /// Bytes held.
     pub fn memory_bytes(&self) -> usize {
-        self.twins.as_ref().map_or(0, Twins::memory_bytes)
+        self.duplicates.as_ref().map_or(0, Duplicates::memory_bytes)
             + self.tree.memory_bytes()
             + self.leaves.as_ref().map_or(0, Leaves::memory_bytes)
     }

@@ -146,7 +146,7 @@ fn orthonormal(transposed: DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::error::Kind;
+    use crate::error::ErrorKind;
 
     /// Gives a matrix in blocks of so many rows and columns, and counts how often.
     fn source<'a>(
@@ -290,14 +290,14 @@ mod tests {
             truncated(size, 1, &Options::default(), source).map_err(|error| error.kind())
         };
         assert!(run(0..2, &[1.0, 2.0, 3.0, 4.0]).is_ok());
-        assert_eq!(run(0..2, &[1.0, 2.0, f32::NAN, 4.0]), Err(Kind::Input));
-        assert_eq!(run(0..1, &[1.0, 2.0]), Err(Kind::Internal));
-        assert_eq!(run(1..3, &[1.0, 2.0, 3.0, 4.0]), Err(Kind::Internal));
-        assert_eq!(run(0..2, &[1.0, 2.0, 3.0]), Err(Kind::Internal));
+        assert_eq!(run(0..2, &[1.0, 2.0, f32::NAN, 4.0]), Err(ErrorKind::Input));
+        assert_eq!(run(0..1, &[1.0, 2.0]), Err(ErrorKind::Internal));
+        assert_eq!(run(1..3, &[1.0, 2.0, 3.0, 4.0]), Err(ErrorKind::Internal));
+        assert_eq!(run(0..2, &[1.0, 2.0, 3.0]), Err(ErrorKind::Internal));
         let stopped = truncated(size, 1, &Options::default(), |_| Err(Error::stopped()));
-        assert_eq!(stopped.unwrap_err().kind(), Kind::Stopped);
+        assert_eq!(stopped.unwrap_err().kind(), ErrorKind::Stopped);
         let none = truncated(size, 0, &Options::default(), |_| Ok(()));
-        assert_eq!(none.unwrap_err().kind(), Kind::Usage);
+        assert_eq!(none.unwrap_err().kind(), ErrorKind::Usage);
     }
 
     #[test]

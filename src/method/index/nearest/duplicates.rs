@@ -3,7 +3,7 @@
 use super::tree::squared_distance;
 
 /// The distinct normals of a tile, in the order of the first texel of each, and the texels of each.
-pub(super) struct Twins {
+pub(super) struct Duplicates {
     pub(super) normals: Vec<[f32; 3]>,
     /// Where the texels of each begin, and where those of the last end.
     starts: Vec<u32>,
@@ -11,7 +11,7 @@ pub(super) struct Twins {
     texels: Vec<u32>,
 }
 
-impl Twins {
+impl Duplicates {
     /// Of normals whose order gives the texel numbers, for the `count` nearest.
     pub(super) fn new(normals: &[[f32; 3]], count: usize) -> Self {
         let bits = |texel: u32| normals[texel as usize].map(f32::to_bits);
@@ -19,13 +19,13 @@ impl Twins {
         order.sort_unstable_by_key(|&texel| (bits(texel), texel));
         let mut groups: Vec<&[u32]> = order.chunk_by(|&a, &b| bits(a) == bits(b)).collect();
         groups.sort_unstable_by_key(|group| group[0]);
-        let mut twins = Self { normals: Vec::new(), starts: vec![0], texels: Vec::new() };
+        let mut duplicates = Self { normals: Vec::new(), starts: vec![0], texels: Vec::new() };
         for group in groups {
-            twins.normals.push(normals[group[0] as usize]);
-            twins.texels.extend(&group[..group.len().min(count)]);
-            twins.starts.push(twins.texels.len() as u32);
+            duplicates.normals.push(normals[group[0] as usize]);
+            duplicates.texels.extend(&group[..group.len().min(count)]);
+            duplicates.starts.push(duplicates.texels.len() as u32);
         }
-        twins
+        duplicates
     }
 
     /// Whether every normal has one texel, so that their numbers are the same.

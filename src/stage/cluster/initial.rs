@@ -1,5 +1,5 @@
-//! The first approach: k-medians of texels that fit in memory, all of them or a sample drawn without preference from
-//! the whole measurement or from the first mini-batch.
+//! The initial clustering: k-medians of texels that fit in memory, all of them or a sample drawn without preference
+//! from the whole measurement or from the first mini-batch.
 
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ use crate::words::counted;
 impl Plan {
     /// Clusters all texels in memory.
     pub(super) fn run_in_memory(&self, deadline: Option<Instant>, context: &Context<'_>) -> Result<Report> {
-        let budget = Budget::of_first_approach(self, context)?;
+        let budget = Budget::of_initial(self, context)?;
         let points = self.read_sample(context)?;
         let method = self.method(budget.sample_columns, deadline);
         let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;
@@ -39,8 +39,12 @@ impl Plan {
     }
 
     /// What the first pass over all texels begins with.
-    pub(super) fn approach(&self, deadline: Option<Instant>, context: &Context<'_>) -> Result<State> {
-        let budget = Budget::of_first_approach(self, context)?;
+    pub(super) fn initial_clustering(
+        &self,
+        deadline: Option<Instant>,
+        context: &Context<'_>,
+    ) -> Result<State> {
+        let budget = Budget::of_initial(self, context)?;
         let points = self.read_sample(context)?;
         let method = self.method(budget.sample_columns, deadline);
         let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;

@@ -1,0 +1,70 @@
+//! The normal map of a model.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Model, Stage};
+use crate::error::Result;
+use crate::run::recipe::Recipe;
+use crate::shape::Size;
+use crate::zarr::Layout;
+
+/// How far from 1 the length of a unit normal in f32 may be.
+pub(crate) const UNIT_TOLERANCE: f32 = 1e-4;
+
+/// What a normal map depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NormalsRecipe {
+    /// Digest of the tile.
+    pub tile: String,
+    /// Whether the darkest and the brightest lights of a texel were left out.
+    pub robust: bool,
+}
+
+impl Recipe for NormalsRecipe {
+    const STAGE: &'static str = Stage::Normals.name();
+}
+
+/// How an estimation of normals went.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct NormalsReport {
+    /// Number of the view that was used.
+    pub view: usize,
+    /// Number of lights.
+    pub lights: usize,
+    /// Mean of the normals.
+    pub mean: [f64; 3],
+    /// Root mean square angle between a normal and the mean normal, degrees.
+    pub spread_deg: f64,
+}
+
+impl Model {
+    /// Writes the normal map [y, x, 3], unit vectors.
+    pub fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
+        self.store.write("normals", &normals_layout(size), normals.as_flattened())
+    }
+
+    /// The normal map.
+    pub fn normals(&self) -> Result<Vec<[f32; 3]>> {
+        let layout = normals_layout(self.tile_report()?.size());
+        let values = self.read::<f32>(Stage::Normals, "normals", &layout)?;
+        let normals = values.as_chunks::<3>().0;
+        match normals.iter().position(|normal| !is_unit(normal)) {
+            None => Ok(normals.to_vec()),
+            Some(at) => {
+                Err(self.damaged("normals", &format!("texel {at} has {:?}, no unit vector", normals[at])))
+            }
+        }
+    }
+}
+
+/// Whether a vector is a unit vector, as far as f32 goes.
+pub(crate) fn is_unit(normal: &[f32; 3]) -> bool {
+    let length = normal.iter().map(|value| value * value).sum::<f32>().sqrt();
+    (length - 1.0).abs() <= UNIT_TOLERANCE
+}
+
+pub(super) fn normals_layout(size: Size) -> Layout<'static> {
+    Layout::small::<f32>(&["y", "x", "xyz"], &[size.height, size.width, 3])
+        .with("frame", "x right, y up, z out of the surface")
+}

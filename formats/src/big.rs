@@ -20,9 +20,9 @@ use std::ops::Range;
 use chunks::{Chunks, SIGNATURE};
 use layout::Layout;
 
-use crate::utia::{ASSUMPTIONS, Colors, Grid, Order, transfer, with_capacity};
+use crate::utia::{self, Colors, Grid, Order, transfer, with_capacity};
 use crate::words::counted;
-use crate::{Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
+use crate::{Assumption, Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
 
 /// What the caller knows about a file that the file does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -74,7 +74,7 @@ impl Big {
             let expected = format!("less than {}", layout.tiles);
             return Err(Error::new(ErrorKind::Argument, format!("tile {}", options.tile), expected));
         }
-        let (pairs, mut assumptions) = match (described.directions, options.order) {
+        let (pairs, assumptions) = match (described.directions, options.order) {
             (Some(directions), Order::Stated) => (directions.pairs, directions.assumptions),
             (Some(_), order) => {
                 let found = format!("an order of images, {order:?}, for a file that has directions");
@@ -100,14 +100,14 @@ impl Big {
         let planes = usize::try_from(layout.planes).unwrap_or(usize::MAX);
         let colors = Colors::new(planes, &described.color_space, None);
         let sample_type = colors.sample_type(layout.numbers());
-        assumptions.extend(ASSUMPTIONS.map(String::from));
+        let mut assumptions: Vec<Assumption> = assumptions.into_iter().map(Assumption::from).collect();
+        assumptions.extend(utia::assumptions());
         let (linear, transfer) = transfer(sample_type);
-        assumptions.extend(colors.assumptions);
-        assumptions.push(transfer.to_owned());
+        assumptions.extend(colors.assumptions.into_iter().map(Assumption::from));
+        assumptions.push(transfer);
         if described.color_space.is_empty() {
-            assumptions.push(
-                "The planes are named by their number only: the file gives no colour space.".to_owned(),
-            );
+            assumptions
+                .push("The planes are named by their number only: the file gives no colour space.".into());
         }
         let mut remarks = described.remarks;
         if layout.tiles > 1 {

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::{Direction, Result, SampleType, Samples};
+use crate::{Assumption, Direction, Result, SampleType, Samples};
 
 /// Sizes, directions, and how the samples that [`Images::read_images`] returns are meant.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,8 +25,8 @@ pub struct Contents {
     pub linear: bool,
     /// The cosine of the light's polar angle is in the samples as they are read.
     pub cosine_included: bool,
-    /// What the reader had to assume because the format does not say it, a sentence each.
-    pub assumptions: Vec<String>,
+    /// What the reader had to assume because the format does not say it.
+    pub assumptions: Vec<Assumption>,
     /// What else the archive says of itself (device, scale, names): key and value.
     pub remarks: Vec<(String, String)>,
 }

@@ -49,6 +49,7 @@
 )]
 
 mod angles;
+mod assumption;
 mod behind;
 pub mod big;
 pub mod bonn;
@@ -79,6 +80,7 @@ pub mod words;
 pub mod zip;
 
 pub use angles::Angles;
+pub use assumption::{About, Assumption};
 pub use catalogue::{Catalogue, CatalogueErrors, Duplicate, Pair};
 pub use contents::{Contents, Images};
 pub use direction::{Direction, six_digits};

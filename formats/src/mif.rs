@@ -12,8 +12,8 @@ use std::ops::Range;
 use chunks::{Chunks, Image, SIGNATURE};
 use description::Description;
 
-use crate::utia::{ASSUMPTIONS, Colors, Grid, Order, transfer, with_capacity};
-use crate::{Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
+use crate::utia::{self, Colors, Grid, Order, transfer, with_capacity};
+use crate::{Assumption, Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
 
 /// What the caller chooses, or knows about a file that the file does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -88,10 +88,11 @@ impl Mif {
         let (linear, transfer) = transfer(sample_type);
         let grid = Grid::from_pairs(&description.pairs, limits)?;
 
-        let mut assumptions = description.assumptions;
-        assumptions.extend(ASSUMPTIONS.map(String::from));
-        assumptions.extend(colors.assumptions);
-        assumptions.push(transfer.to_owned());
+        let mut assumptions: Vec<Assumption> =
+            description.assumptions.into_iter().map(Assumption::from).collect();
+        assumptions.extend(utia::assumptions());
+        assumptions.extend(colors.assumptions.into_iter().map(Assumption::from));
+        assumptions.push(transfer);
         let mut remarks = description.remarks;
         let others = chunks.images.len().saturating_sub(images.len());
         if others > 0 {

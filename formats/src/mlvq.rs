@@ -24,7 +24,7 @@ pub use zero_bytes::ZeroBytes;
 use crate::reader::Reader;
 use crate::ubo2003::{Angles, directions_81};
 use crate::words::counted;
-use crate::{Contents, Direction, Images, Limits, Result, SampleType, Samples, request};
+use crate::{Assumption, Contents, Direction, Images, Limits, Result, SampleType, Samples, request};
 
 /// Whether the first line is that of a database.
 pub fn recognise(bytes: &[u8]) -> bool {
@@ -81,22 +81,25 @@ impl Database {
     }
 }
 
-fn assumptions(resolved: Resolved) -> Vec<String> {
+fn assumptions(resolved: Resolved) -> Vec<Assumption> {
     let mut list = vec![
-        "The samples are display values through the sRGB curve: the photographs that were compressed are 8-bit and say nothing."
-            .to_owned(),
-        "The cosine of the light's angle is in the samples, as it is in UBO2003.".to_owned(),
-        "The directions are the 81 of UBO2003, as the file gives only their number.".to_owned(),
+        Assumption::transfer(
+            "The samples are display values through the sRGB curve: the photographs that were compressed are 8-bit and say nothing.",
+        ),
+        Assumption::cosine("The cosine of the light's angle is in the samples, as it is in UBO2003."),
+        "The directions are the 81 of UBO2003, as the file gives only their number.".into(),
     ];
     let Resolved { known, by_rule } = resolved;
     if known > 0 {
-        list.push(format!("Ambiguous zero bytes of the tables, read as zero_bytes.txt says: {known}."));
+        list.push(
+            format!("Ambiguous zero bytes of the tables, read as zero_bytes.txt says: {known}.").into(),
+        );
     }
     if by_rule > 0 {
         list.push(format!(
             "Ambiguous zero bytes of the tables, resolved by continuity: {by_rule}. Each is its table's minimum or maximum, \
              whichever fits its neighbours."
-        ));
+        ).into());
     }
     list
 }

@@ -6,6 +6,7 @@ mod half_difference;
 mod numbers;
 mod order;
 
+use crate::Assumption;
 pub(crate) use colors::{Colors, transfer};
 pub(crate) use grid::{Grid, Pair};
 pub(crate) use half_difference::{below_the_surface, light_and_view};
@@ -13,7 +14,13 @@ pub(crate) use numbers::{Number, with_capacity};
 pub use order::Order;
 
 /// What both readers have to assume, as neither format says it.
-pub(crate) const ASSUMPTIONS: [&str; 2] = [
-    "Azimuths run counter-clockwise from the right-hand side of the image; the format does not say.",
-    "The cosine of the light's angle is in the samples, as the published viewer takes them.",
-];
+pub(crate) fn assumptions() -> [Assumption; 2] {
+    [
+        Assumption::azimuths(
+            "Azimuths run counter-clockwise from the right-hand side of the image; the format does not say.",
+        ),
+        Assumption::cosine(
+            "The cosine of the light's angle is in the samples, as the published viewer takes them.",
+        ),
+    ]
+}

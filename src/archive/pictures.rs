@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use btfkit_formats::picture::{self, DecodeOptions, PictureHeader};
-use btfkit_formats::{Angles, Contents, Limits, SampleType, Samples};
+use btfkit_formats::{Angles, Assumption, Contents, Limits, SampleType, Samples};
 
 use super::catalogue::{self, Found};
 use super::files::Files;
@@ -48,7 +48,8 @@ impl Pictures {
     pub(super) fn open(paths: &[PathBuf], options: &Options, limits: Limits) -> Result<Self> {
         let path = paths.first().cloned().unwrap_or_default();
         let files = Files::list(paths, &limits)?;
-        let Found { catalogue, format, mut assumptions } = catalogue::find(&path, &files, options, &limits)?;
+        let Found { catalogue, format, assumptions } = catalogue::find(&path, &files, options, &limits)?;
+        let mut assumptions: Vec<Assumption> = assumptions.into_iter().map(Assumption::from).collect();
         let directions = |angles: &[Angles]| angles.iter().map(|a| a.direction()).collect::<Vec<_>>();
         let (views, lights) = (directions(catalogue.views()), directions(catalogue.lights()));
         let images: Vec<usize> = (0..views.len())
@@ -60,24 +61,23 @@ impl Pictures {
             .map_err(|error| Error::from(error.in_entry(files.name(first))).context(path.display()))?;
         files.release(first);
         if !header.linear {
-            assumptions.push("the pictures' transfer curve is sRGB".to_owned());
+            assumptions.push(Assumption::transfer("the pictures' transfer curve is sRGB"));
         }
         if let Some(profile) = &header.profile {
-            let taken = if header.linear { "proportional to reflectance" } else { "sRGB" };
-            assumptions.push(format!(
-                "{profile}, which the pictures state, is not applied: samples are taken as {taken}"
-            ));
+            assumptions.push(format!("{profile}, which the pictures state, is not applied").into());
         }
         if header.scanlines_are_columns {
-            assumptions.push(format!("scan lines that are columns: read as {:?}", options.hdr_orientation));
+            assumptions
+                .push(format!("scan lines that are columns: read as {:?}", options.hdr_orientation).into());
         }
         if header.orientation != 1 {
-            assumptions.push(format!(
-                "the orientation {} that the pictures ask for is not applied: rows and columns are as stored",
-                header.orientation
-            ));
+            let asked = header.orientation;
+            assumptions.push(
+                format!("the orientation {asked} that the pictures ask for is not applied: rows and columns are as stored")
+                    .into(),
+            );
         }
-        assumptions.extend(header.remarks.iter().cloned());
+        assumptions.extend(header.remarks.iter().cloned().map(Assumption::from));
         let contents = Contents {
             format,
             width: header.width,

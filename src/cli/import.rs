@@ -69,20 +69,17 @@ impl Import {
         Ok(Ended::Done)
     }
 
-    fn jobs(&self) -> Result<Vec<Job>> {
-        let is_store =
-            |path: &Path| path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists();
-        if let ([store, .., archive], None) = (self.paths.as_slice(), &self.into)
-            && is_store(store)
-            && !is_store(archive)
-        {
-            return Err(Error::usage(format!(
-                "got the store {} before {}, expected the archive first and the store last",
-                store.display(),
-                archive.display()
-            ))
-            .hint(format!("btf import {} {}", archive.display(), store.display())));
+    /// The store and the archive, where they are named in the wrong order.
+    fn swapped(&self) -> Option<(&Path, &Path)> {
+        match self.paths.as_slice() {
+            [store, .., archive] if self.into.is_none() && is_store(store) && !is_store(archive) => {
+                Some((store, archive))
+            }
+            _ => None,
         }
+    }
+
+    fn jobs(&self) -> Result<Vec<Job>> {
         let folder = self.into.clone().unwrap_or_default();
         // Misspelt, the last of many archives is not to become a store.
         let is_new = |path: &Path| {
@@ -101,6 +98,14 @@ impl Import {
                     error
                 },
             );
+        }
+        if let Some((store, archive)) = self.swapped() {
+            return Err(Error::usage(format!(
+                "got the store {} before {}, expected the archive first and the store last",
+                store.display(),
+                archive.display()
+            ))
+            .hint(format!("btf import {} {}", archive.display(), store.display())));
         }
         match self.paths.split_last() {
             Some((store, pieces)) if self.into.is_none() && is_store(store) && !pieces.is_empty() => {
@@ -205,6 +210,11 @@ impl Import {
 /// Whether samples of a type can be above white.
 fn holds_highlights(samples: SampleType) -> bool {
     matches!(samples, SampleType::F16 | SampleType::F32)
+}
+
+/// Whether a path is that of a store, made or to be made.
+fn is_store(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists()
 }
 
 fn summary(description: &Description, report: &Report) -> String {

@@ -112,7 +112,7 @@ impl Info {
             store_bytes: [Chain::Stock, Chain::Predictive].into_iter().map(bytes).collect::<Result<_>>()?,
             remarks: contents.remarks.clone(),
             notes: btfkit::archive::notes(source.as_ref()),
-            assumptions: contents.assumptions.clone(),
+            assumptions: contents.assumptions.iter().map(|assumption| assumption.text.clone()).collect(),
         })))
     }
 }

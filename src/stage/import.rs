@@ -113,7 +113,7 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
         images: source.check(context)?,
         reading: serde_json::to_value(source.reading())
             .map_err(|error| Error::internal(error.to_string()))?,
-        assumptions: contents.assumptions.clone(),
+        assumptions: contents.assumptions.iter().map(|assumption| assumption.text.clone()).collect(),
         ..ImportRecipe::of(&description, options.codec)
     };
     Ok(Plan { source, options, description, recipe })

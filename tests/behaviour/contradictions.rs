@@ -1,10 +1,11 @@
 //! Archives that contradict themselves or leave something open: the right reading, a refusal, or a printed note.
 
 use std::fs;
+use std::path::Path;
 
 use btfkit_formats::{npy, zip};
 
-use crate::fixture::{btf, fail, succeed};
+use crate::fixture::{btf, fail, fixture, succeed};
 use crate::odd_archives::{RIGHT, azimuths, list, png, refused, set, three, told};
 
 /// A zip of these files.
@@ -92,8 +93,7 @@ fn colours_that_are_not_srgb_are_stated_and_not_mixed() {
         set(&files)
     };
     let words = |root: &std::path::Path| told(root).split_whitespace().collect::<Vec<_>>().join(" ");
-    let stated =
-        "the gamma 1.00000 (gAMA), which the pictures state, is not applied: samples are taken as sRGB";
+    let stated = "the gamma 1.00000 (gAMA), which the pictures state, is not applied";
     let (_folder, root) = of([100_000; 2]);
     assert!(words(&root).contains(stated), "{}", words(&root));
     let (_folder, root) = of([45_455; 2]);
@@ -214,4 +214,29 @@ fn names_of_channels_that_do_not_fit_are_refused_by_a_hint_that_helps() {
     assert!(error.contains("channel 0, channel 1, channel 2, channel 3, expected one grey"), "{error}");
     fs::write(&array, bytes(3)).unwrap();
     succeed(btf().arg("info").arg(&array));
+}
+
+#[test]
+fn what_an_option_says_is_no_longer_assumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let array = folder.path().join("m.npy");
+    succeed(btf().arg("export").args([&fixture().measurement(), &array]));
+    let about = |path: &Path, options: &[&str]| {
+        let told = succeed(btf().arg("info").arg(path).args(options));
+        told.split_whitespace().collect::<Vec<_>>().join(" ")
+    };
+    let archive = fixture().archive();
+    for (path, options, assumed) in [
+        (&array, ["--transfer", "linear"], "taken to be display values (sRGB)"),
+        (&array, ["--cosine", "excluded"], "cosine of the light's polar angle is taken to be in the samples"),
+        (&archive, ["--transfer", "linear"], "the pictures' transfer curve is sRGB"),
+    ] {
+        let (before, after) = (about(path, &[]), about(path, &options));
+        assert!(before.contains(assumed), "{before}");
+        assert!(!after.contains(assumed), "{options:?}: {after}");
+    }
+    // What the option says nothing about is still assumed.
+    assert!(about(&array, &["--transfer", "linear"]).contains("Row 0 is taken to be the top"));
+    // An option that says what is assumed anyway changes nothing.
+    assert_eq!(about(&array, &["--transfer", "srgb"]), about(&array, &[]));
 }

@@ -9,7 +9,7 @@ use super::images::{self, Plane};
 use super::signature::{BonnKind, Signature, readings};
 use crate::reader::Reader;
 use crate::words::counted;
-use crate::{Contents, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
+use crate::{Assumption, Contents, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
 
 /// Which row of the image is stored first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -213,41 +213,44 @@ fn format_name(kind: BonnKind, payload: &Payload) -> String {
     }
 }
 
-fn assumptions(header: &Header, payload: &Payload, options: &OpenOptions) -> Vec<String> {
+fn assumptions(header: &Header, payload: &Payload, options: &OpenOptions) -> Vec<Assumption> {
     let mut list = vec![
         match options.rows {
             RowOrder::TopFirst => "The first stored row is taken as the top of the image.",
             RowOrder::BottomFirst => "The first stored row is taken as the bottom of the image.",
         }
-        .to_owned(),
-        "Azimuths are taken as counter-clockwise from the right of the image.".to_owned(),
+        .into(),
+        Assumption::azimuths("Azimuths are taken as counter-clockwise from the right of the image."),
     ];
     if header.cosine_included.is_none() {
         let text = "The header is too old to say whether the cosine of the light angle is in the data; it is \
                     taken as not.";
-        list.push(text.to_owned());
+        list.push(Assumption::cosine(text));
     }
     if let Some(view) = header.other_lights {
-        list.push(format!(
-            "Light directions of view {view} are not those of view 0; those of view 0 are used for all."
-        ));
+        list.push(
+            format!(
+                "Light directions of view {view} are not those of view 0; those of view 0 are used for all."
+            )
+            .into(),
+        );
     }
     match payload {
         Payload::Factors(factors) => {
             if factors.ambiguous {
                 let text = "There are as many direction pairs as pixels, so that the matrices could be \
                             transposed; they are read in the usual orientation.";
-                list.push(text.to_owned());
+                list.push(text.into());
             }
             if factors.color.is_lab() {
                 let text = "Lab values are taken as relative to D50 and turned into linear sRGB.";
-                list.push(text.to_owned());
+                list.push(text.into());
             }
         }
         Payload::Bdi(bdi) => {
             if bdi.missing > 0 {
                 let text = "The mask of missing pixels is read row by row, as the samples are.";
-                list.push(text.to_owned());
+                list.push(text.into());
             }
         }
     }

@@ -10,7 +10,9 @@ use crate::directions::published_name;
 use crate::file_name::repeated;
 use crate::text::utf8;
 use crate::words::counted;
-use crate::{Angles, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples};
+use crate::{
+    Angles, Assumption, Contents, Direction, Error, ErrorKind, Images, Limits, Result, SampleType, Samples,
+};
 
 /// An array `[view, light, y, x, channel]` of uint8, uint16, float16, float32 or float64, in C order, row 0
 /// at the top. float64 is read as float32.
@@ -247,19 +249,19 @@ fn checked(axis: &str, count: u64, given: Option<Vec<Direction>>) -> Result<Vec<
     }
 }
 
-fn assumptions(linear: bool, assumed_view: bool) -> Vec<String> {
+fn assumptions(linear: bool, assumed_view: bool) -> Vec<Assumption> {
     let transfer = if linear {
         "Samples are floating-point, so they are taken to be proportional to reflectance."
     } else {
         "Samples are integers, so they are taken to be display values (sRGB)."
     };
     let mut list = vec![
-        transfer.to_owned(),
-        "The cosine of the light's polar angle is taken to be in the samples, row 0 to be the top."
-            .to_owned(),
+        Assumption::transfer(transfer),
+        Assumption::cosine("The cosine of the light's polar angle is taken to be in the samples."),
+        "Row 0 is taken to be the top.".into(),
     ];
     if assumed_view {
-        list.push("The one view is taken to be frontal.".to_owned());
+        list.push("The one view is taken to be frontal.".into());
     }
     list
 }

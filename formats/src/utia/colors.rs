@@ -1,7 +1,7 @@
 //! What the planes of an image are.
 
 use super::Number;
-use crate::SampleType;
+use crate::{Assumption, SampleType};
 
 /// Names of the planes, and the value that floats have where reflectance is 1.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,11 +43,12 @@ impl Colors {
 }
 
 /// Whether samples of a type are proportional to reflectance, and how that is known.
-pub(crate) fn transfer(sample_type: SampleType) -> (bool, &'static str) {
-    match sample_type {
+pub(crate) fn transfer(sample_type: SampleType) -> (bool, Assumption) {
+    let (linear, text) = match sample_type {
         SampleType::U8 => {
             (false, "8-bit samples are display values through the sRGB curve; the format does not say.")
         }
         _ => (true, "Samples are proportional to reflectance; the format does not say."),
-    }
+    };
+    (linear, Assumption::transfer(text))
 }

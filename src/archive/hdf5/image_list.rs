@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use btfkit_formats::{Contents, Limits, SampleType};
+use btfkit_formats::{Assumption, Contents, Limits, SampleType};
 use hdf5::H5Type;
 
 use super::dataset::{File, Table, side};
@@ -50,13 +50,13 @@ impl ImageList {
             lights: grid.lights.clone(),
             linear: true,
             cosine_included: true,
-            assumptions: [
-                "Directions are taken to be x right and y up in the picture, towards light and viewer.",
-                "Row 0 of an image is taken to be the top.",
-                "The cosine of the light's angle is taken to be in the samples.",
-            ]
-            .map(str::to_owned)
-            .to_vec(),
+            assumptions: vec![
+                Assumption::azimuths(
+                    "Directions are taken to be x right and y up in the picture, towards light and viewer.",
+                ),
+                "Row 0 of an image is taken to be the top.".into(),
+                Assumption::cosine("The cosine of the light's angle is taken to be in the samples."),
+            ],
             remarks: Vec::new(),
         };
         Ok((Self { color, grid }, contents))

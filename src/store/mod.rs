@@ -185,7 +185,12 @@ impl Store {
 
     fn expect_ours_or_nothing(&self) -> Result<()> {
         // A link that leads nowhere is no free name.
-        recognise::expect_readable(self.path())?;
+        if self.path().is_symlink() {
+            let found = recognise::expect_readable(self.path());
+            found.map_err(|error| {
+                Error::input(error.to_string()).hint("choose another name for the result")
+            })?;
+        }
         let occupied = match self.attributes()? {
             Some(_) => false,
             None => self.metadata_path("").exists() || recognise::other(self.path())?.is_some(),

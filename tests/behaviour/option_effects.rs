@@ -101,7 +101,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
             ("picture", Shows(&["--picture", "{new}/p.png"], &[])),
             ("transfer", READING),
             ("samples", READING),
-            ("azimuth", Shows(&["--json", "--azimuth", "mirrored-lights"], &["--json"])),
+            ("azimuth", READING),
             ("turn", READING),
             ("transpose", READING),
             ("swap", READING),

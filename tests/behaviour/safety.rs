@@ -842,7 +842,7 @@ fn less_memory_than_a_command_takes_is_refused_with_what_it_takes() {
         format!("info {measurement}"),
         format!("model {measurement} {}", out("o.model.zarr")),
         format!("tile {measurement} {}", out("o.model.zarr")),
-        format!("compare {measurement} {model}"),
+        format!("compare {model} {measurement}"),
         format!("enlarge {model} {} --size 64x64", out("b.zarr")),
         format!("image {measurement} --out {}", out("i.png")),
         format!("export {measurement} {}", out("i.dzi")),

@@ -121,9 +121,14 @@ impl Plan {
             Choice::Sized(size) => size.texels(),
             _ => description.size.texels(),
         };
-        let own = description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64);
         let clustering = cluster::enough_bytes(clusters, description, texels, threads);
-        clustering.max(OWN_BYTES + own.max(fit::memory_bytes(texels)))
+        clustering.max(OWN_BYTES + self.memory_bytes().max(fit::memory_bytes(texels)))
+    }
+
+    /// Memory that choosing the tile takes.
+    fn memory_bytes(&self) -> u64 {
+        let description = self.measurement.description();
+        description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64)
     }
 
     /// What would be done.
@@ -138,6 +143,12 @@ impl Plan {
 
     /// Cuts the tile, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
+        let description = self.measurement.description();
+        let plane = description.size;
+        // Nothing is begun that cannot be done.
+        if !self.is_done() {
+            context.require(&format!("choosing a tile from a plane of {plane}"), self.memory_bytes())?;
+        }
         let model = Model::create(&self.model, context)?;
         if context.existing == Existing::Keep {
             expect_measurement(&model, &self.measurement)?;
@@ -148,10 +159,6 @@ impl Plan {
         let Some(_lock) = begun else {
             return model.report(Stage::Tile);
         };
-        let description = self.measurement.description();
-        let plane = description.size;
-        let needed = plane.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64);
-        context.require(&format!("choosing a tile from a plane of {plane}"), needed)?;
         let features = features(&self.measurement, context)?;
         let (tile, patch, lattice) = context.compute(|| self.tile(&features))?;
         let report = Report {

@@ -7,7 +7,7 @@
 //! 3. A scale was chosen so that the function that it scales keeps the mean of the function that was measured. What
 //!    was measured is continuous: over alpha, view theta, view phi, and over the surface. So the scaled mean at the
 //!    entry should be the mean of the scaled means beside it. A colour, likewise, is near to those that stand beside it
-//! in    functions over beta.
+//!    in functions over beta.
 //!
 //! Facts 2 and 3 give for every entry a wanted value; the nearer end of the range is taken. If that leaves a table
 //! without one of its ends, the entry that was decided most narrowly goes the other way.

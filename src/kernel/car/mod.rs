@@ -268,7 +268,7 @@ fn make(kernel: Kernel, above: &Above, along: &Along, work: Work<'_>) {
         make_with::<[f32; LANES]>(above, along, work),
         make_avx2(above, along, work),
         make_avx512(above, along, work),
-    )
+    );
 }
 
 #[inline(always)]

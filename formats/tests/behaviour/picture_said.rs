@@ -115,7 +115,7 @@ fn pixels_that_are_not_square_are_told_by_every_format() {
     let hdr = |line: &str| hdr_of(&format!("{RGBE}{line}"), "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat);
     for (bytes, place) in [
         (png(&[phys(100, 200)]), "pHYs"),
-        (png(&[png_chunk(b"sCAL", b"\x012.0\01e0")]), "sCAL"),
+        (png(&[png_chunk(b"sCAL", b"\x012.0\x001e0")]), "sCAL"),
         (jpeg(&[jfif(36, 72)]), "JFIF"),
         (tiff(&[(282, vec![50]), (283, vec![100])]), "resolutions"),
         (tiff(&[(33550, vec![2, 1, 0])]), "ModelPixelScale"),

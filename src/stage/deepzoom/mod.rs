@@ -27,6 +27,7 @@ use crate::run::{Context, read_ahead};
 use crate::stage::image::{self, Scene, Subject};
 
 use place::PyramidFiles;
+pub use verify::Pyramidal;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.

@@ -457,6 +457,20 @@ mod tests {
     use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
     use super::*;
 
+    #[test]
+    fn a_stop_says_whether_the_command_goes_on_or_begins_anew() {
+        let told = |line: &str| {
+            let cli = Cli::try_parse_from(line.split(' ')).unwrap();
+            stopped(cli.command.goes_on()).guidance().unwrap().to_owned()
+        };
+        for line in ["btf import a", "btf model a", "btf enlarge a --size 9x9", "btf export a a.dzi"] {
+            assert!(told(line).contains("to go on"), "{line}: {}", told(line));
+        }
+        for line in ["btf export a a.btf --rank 2", "btf image a --out b.png", "btf judge a --against b"] {
+            assert!(told(line).contains("begins from the start"), "{line}: {}", told(line));
+        }
+    }
+
     /// An option that is not in the table of effects may be forgotten in a recipe: so it does not pass.
     #[test]
     fn of_every_option_it_is_said_whether_the_result_depends_on_it() {

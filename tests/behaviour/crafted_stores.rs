@@ -154,7 +154,7 @@ fn attributes_that_no_model_has_are_found_behind_right_seals() {
         (vec![("cluster/recipe/tile", json!("0"))], "stage cluster is not of this tile"),
         (vec![("appearance/recipe/cluster", json!("0"))], "stage appearance is not of this cluster"),
         (vec![("fit/report/mrf", json!("2d"))], "mrf: got"),
-        (vec![("fit/recipe/levels", json!(2))], "got 1 levels"),
+        (vec![("fit/recipe/levels", json!(2))], "got 1 level,"),
         (vec![("fit/report/levels/0/eta", json!(0))], "level 0: got 0 sites"),
         (vec![("fit/report/levels/0/eta", json!(4097))], "level 0: got 4097 sites"),
         (vec![("fit/recipe/levels", json!(0)), ("fit/report/levels", json!([]))], "got 0 levels"),

@@ -151,7 +151,7 @@ impl Cluster {
         match self.step {
             Some(StepName::Prepare) => given.refuse_these(&["pass", "shard"], "in --step prepare")?,
             Some(StepName::Reduce) => {
-                given.refuse_these(&["shard"], "in --step reduce, which is one process")?
+                given.refuse_these(&["shard"], "in --step reduce, which is one process")?;
             }
             _ => {}
         }

@@ -60,7 +60,7 @@ pub(super) fn each<I>(
             match (&line, &error) {
                 (Some(Line::Text(text)), None) => console.line(format!("{name}: {text}")),
                 (Some(Line::Json(value)), _) => {
-                    console.json_line(&of_json(&name, Some(value), error.as_ref()))
+                    console.json_line(&of_json(&name, Some(value), error.as_ref()));
                 }
                 (None, Some(_)) if as_json => console.json_line(&of_json(&name, None, error.as_ref())),
                 _ => {}

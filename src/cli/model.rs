@@ -88,7 +88,7 @@ impl Model {
         // A line may be told only while no bar is drawn.
         let console = console.brief();
         let print = |found: bool, print: &dyn Fn(Console)| {
-            context.progress.pause(&mut || print(console.found(found)))
+            context.progress.pause(&mut || print(console.found(found)));
         };
         begin(Stage::Tile);
         let found = plan.is_done();

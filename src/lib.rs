@@ -59,8 +59,8 @@
 //! # Where things are
 //!
 //! [`stage`] holds what each command does, [`method`] the steps of the paper as pure computation, [`check`] what can be
-//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean, over
-//! [`zarr`] and [`disk`]. [`run`] makes long work survive, [`kernel`] holds the hot loops.
+//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean. [`run`]
+//! makes long work survive. Rooms that the page does not list (kernels, Zarr, files) are no part of the interface.
 //!
 //! # Errors
 //!
@@ -88,23 +88,32 @@ pub mod archive;
 pub mod check;
 pub mod color;
 pub mod demo;
-pub mod disk;
 pub mod error;
-pub mod kernel;
 pub mod lattice;
 pub mod likeness;
 pub mod method;
-pub mod names;
 pub mod picture;
-pub mod random;
 pub mod run;
 pub mod sample;
 pub mod shape;
 mod signal;
 pub mod stage;
 pub mod store;
+
+// For the program, the tests and the benches of this package; no part of the interface.
+#[doc(hidden)]
+pub mod disk;
+#[doc(hidden)]
+pub mod kernel;
+#[doc(hidden)]
+pub mod names;
+#[doc(hidden)]
+pub mod random;
+#[doc(hidden)]
 pub mod text;
+#[doc(hidden)]
 pub mod words;
+#[doc(hidden)]
 pub mod zarr;
 
 pub use btfkit_formats::Direction;

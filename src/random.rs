@@ -60,7 +60,7 @@ pub(crate) fn unit_interval(word: u32) -> f64 {
 /// (Wichura 1988, algorithm AS 241, PPND16). `libm` keeps the tails equal on every machine.
 #[inline]
 #[allow(clippy::excessive_precision)] // digits as published
-pub fn normal_quantile(p: f64) -> f64 {
+pub(crate) fn normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
         let r = 0.180625 - q * q;

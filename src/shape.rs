@@ -114,7 +114,7 @@ const AREA_MOST: i64 = 1 << 31;
 
 impl Area {
     /// The window that it is of a plane that begins at row 0 and column 0.
-    pub fn within_first_quadrant(self) -> Option<Window> {
+    pub(crate) fn within_first_quadrant(self) -> Option<Window> {
         let place = |place: i64| usize::try_from(place).ok();
         Some(Window { y: place(self.y)?, x: place(self.x)?, size: self.size })
     }

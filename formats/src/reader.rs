@@ -32,7 +32,7 @@ impl<'a> Reader<'a> {
             let left = self.rest().len();
             return Err(Error::malformed(
                 format!("the end of the data after {}", counted(left, "more byte")),
-                format!("{}", counted(len, "more byte")),
+                counted(len, "more byte").to_string(),
             )
             .at(self.position));
         };

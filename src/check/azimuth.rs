@@ -24,7 +24,7 @@ use crate::words::counted;
 pub const NAME: &str = "azimuth";
 
 /// Codes of findings that light and view azimuths contradict each other.
-pub const APART: [&str; 3] = ["view-azimuth-mirrored", "light-azimuth-mirrored", "azimuths-disagree"];
+pub(crate) const APART: [&str; 3] = ["view-azimuth-mirrored", "light-azimuth-mirrored", "azimuths-disagree"];
 
 /// Least side of the plane, texels.
 const LEAST_SIDE: usize = 24;

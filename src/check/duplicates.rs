@@ -15,7 +15,7 @@ use crate::words::counted;
 use btfkit_formats::Direction;
 
 /// Name of the check.
-pub const NAME: &str = "duplicate-images";
+pub(crate) const NAME: &str = "duplicate-images";
 
 /// Directions nearer than this are one direction, degrees.
 const SAME_DEG: f64 = 0.5;
@@ -43,7 +43,7 @@ struct Candidate<'a> {
 }
 
 /// Looks for equal and nearly equal images of different directions.
-pub fn check(statistics: &Statistics) -> Check {
+pub(crate) fn check(statistics: &Statistics) -> Check {
     let lights = statistics.lights.len();
     let mut candidates: Vec<Candidate<'_>> = (0..statistics.images.len())
         .map(|at| (at / lights, at % lights))

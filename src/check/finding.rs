@@ -7,7 +7,7 @@ use super::statistics::Statistics;
 
 /// Below this confidence a finding is a suspicion and no fault: a person should look. Evidence of 1.43
 /// times its threshold has it.
-pub const SURE: f64 = 0.65;
+pub(crate) const SURE: f64 = 0.65;
 
 /// What is shown of an alarm at most: more says no more.
 pub const MOST_ALARM: f64 = 10.0;

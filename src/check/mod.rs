@@ -6,7 +6,7 @@
 mod angular;
 pub mod archive_views;
 pub mod azimuth;
-pub mod duplicates;
+pub(crate) mod duplicates;
 pub mod exposure;
 pub mod finding;
 pub mod misplaced;

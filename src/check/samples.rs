@@ -7,13 +7,13 @@ use super::statistics::Statistics;
 use crate::words::counted;
 
 /// Name of the check of impossible numbers.
-pub const NUMBERS: &str = "numbers";
+pub(crate) const NUMBERS: &str = "numbers";
 /// Name of the check for images on which nothing is.
-pub const BLACK: &str = "black-images";
+pub(crate) const BLACK: &str = "black-images";
 /// Name of the check for images that are of one brightness.
-pub const CONTRAST: &str = "contrast";
+pub(crate) const CONTRAST: &str = "contrast";
 /// Name of the check for clipping.
-pub const SATURATION: &str = "saturation";
+pub(crate) const SATURATION: &str = "saturation";
 
 /// Negative samples below this, in reflectance, are not the noise of a dark frame taken off.
 const NOISE: f32 = -0.02;
@@ -174,7 +174,7 @@ pub fn contrast(statistics: &Statistics, saturated: bool) -> Check {
 }
 
 /// Looks for samples at the largest value.
-pub fn saturation(statistics: &Statistics) -> Check {
+pub(crate) fn saturation(statistics: &Statistics) -> Check {
     let of_image = ranked(statistics, |view, light| statistics.clipped_share(view, light));
     let share =
         of_image.iter().fold(0.0, |sum, (_, share)| sum + share) / statistics.images.len().max(1) as f64;

@@ -29,10 +29,10 @@ pub(super) const BLACK: f64 = 0.02;
 const PLAIN: f32 = 1e-3;
 
 /// Number of readings of the transfer curve: see [`Image::means`].
-pub const READINGS: usize = 3;
+pub(crate) const READINGS: usize = 3;
 
 /// The reading that the description declares.
-pub const DECLARED: usize = 1;
+pub(crate) const DECLARED: usize = 1;
 
 /// What is known of one image.
 #[derive(Clone, Debug, Default)]
@@ -95,24 +95,24 @@ impl Statistics {
     }
 
     /// Share of an image's samples that have the largest value of all.
-    pub fn clipped_share(&self, view: usize, light: usize) -> f64 {
+    pub(crate) fn clipped_share(&self, view: usize, light: usize) -> f64 {
         let image = self.image(view, light);
         if image.largest >= self.largest { image.at_largest as f64 / self.samples.max(1) as f64 } else { 0.0 }
     }
 
     /// Whether every texel of an image is as bright as the others. One texel alone is no image.
-    pub fn is_plain(&self, view: usize, light: usize) -> bool {
+    pub(crate) fn is_plain(&self, view: usize, light: usize) -> bool {
         let [least, largest] = self.image(view, light).range;
         self.size.texels() > 1 && largest - least <= PLAIN * largest.abs().max(least.abs())
     }
 
     /// Whether an image is so much darker than others of its view or of its light that nothing was photographed.
-    pub fn is_black(&self, view: usize, light: usize) -> bool {
+    pub(crate) fn is_black(&self, view: usize, light: usize) -> bool {
         self.relative[view * self.lights.len() + light] < BLACK
     }
 
     /// Light of the darkest image as a share of that of its like.
-    pub fn darkest(&self) -> f64 {
+    pub(crate) fn darkest(&self) -> f64 {
         self.relative.iter().copied().fold(f64::INFINITY, f64::min)
     }
 }
@@ -152,7 +152,7 @@ struct ViewStatistics {
 }
 
 /// Reads every view once, as many at a time as memory allows.
-pub fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statistics> {
+pub(crate) fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statistics> {
     let description = source.description();
     let views: Vec<usize> = (0..description.views.len()).collect();
     let frontal = frontal_view(&description.views);

@@ -444,7 +444,7 @@ fn found(made: Made) -> &'static str {
 
 #[cfg(test)]
 #[path = "../../tests/behaviour/option_effects.rs"]
-#[allow(dead_code)] // what the tests of behaviour run
+#[allow(dead_code)] // the behaviour tests read the rest
 mod option_effects;
 
 #[cfg(test)]

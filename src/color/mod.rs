@@ -76,7 +76,7 @@ fn lab_curve(t: f64) -> f64 {
 }
 
 /// CIE 1976 L*a*b* (D65) of linear RGB.
-pub fn lab(rgb: [f64; 3]) -> [f64; 3] {
+pub(crate) fn lab(rgb: [f64; 3]) -> [f64; 3] {
     let [r, g, b] = rgb;
     let x = (0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.950_47;
     let y = 0.212_672_9 * r + 0.715_152_2 * g + 0.072_175_0 * b;

@@ -7,7 +7,7 @@ use btfkit_formats::Samples;
 use super::{Transfer, srgb_decode};
 
 /// A run of samples as they are, on the scale where the largest integer and the float 1.0 are reflectance 1.
-pub fn scaled(samples: &Samples, range: Range<usize>) -> Vec<f32> {
+pub(crate) fn scaled(samples: &Samples, range: Range<usize>) -> Vec<f32> {
     match samples {
         Samples::U8(list) => list[range].iter().map(|&s| f32::from(s) / 255.0).collect(),
         Samples::U16(list) => list[range].iter().map(|&s| f32::from(s) / 65535.0).collect(),

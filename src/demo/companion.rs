@@ -14,7 +14,7 @@ use crate::random::Hash;
 const DRAWN: u32 = 1000;
 
 /// A tile that joins the first one on every side.
-pub struct Companion {
+pub(crate) struct Companion {
     /// Its texels as sources in the measurement; its size is that of the first tile.
     pub tile: Tile,
     /// Row and column in the measurement of the region that became its interior.
@@ -25,7 +25,7 @@ pub struct Companion {
 
 /// Cuts a companion of `first`: of the regions drawn at random, those that share least with it, and
 /// of these the one whose four paths cost least. The same seed cuts the same companion.
-pub fn companion(features: &Features, first: &Cut, seed: u64) -> Companion {
+pub(crate) fn companion(features: &Features, first: &Cut, seed: u64) -> Companion {
     let hash = Hash::new(seed, u32::from_be_bytes(*b"pair"));
     let Patch { height, width, .. } = first.patch;
     let draw = |number: u32| {
@@ -102,7 +102,7 @@ fn join(first: &Cut, border: &Border, origin: [usize; 2]) -> Companion {
 
 /// Whether the companion stands at a place (row, column of tiles) of a plane laid with both: a coin
 /// hashed from the place, so that neither order nor size of the plane matters.
-pub fn stands_at(seed: u64, row: usize, column: usize) -> bool {
+pub(crate) fn stands_at(seed: u64, row: usize, column: usize) -> bool {
     Hash::new(seed, u32::from_be_bytes(*b"coin")).below(2, row as u32, column as u32, 0) == 1
 }
 

@@ -25,7 +25,7 @@ impl Existing {
     ///
     /// # Errors
     /// [`ErrorKind::Recipe`].
-    pub fn expect_free(self, path: &Path) -> Result<()> {
+    pub(crate) fn expect_free(self, path: &Path) -> Result<()> {
         match self {
             Self::Keep if is_there(path) => Err(taken(path, "exists")),
             _ => match special(path) {
@@ -164,7 +164,7 @@ pub fn prepare(
 ///
 /// # Errors
 /// As [`prepare`].
-pub fn prepare_seeking(
+pub(crate) fn prepare_seeking(
     path: &Path,
     existing: Existing,
     write: impl FnOnce(&mut Output) -> Result<()>,
@@ -199,7 +199,7 @@ pub fn publish_all(files: impl IntoIterator<Item = Ready>) -> Result<Made> {
 ///
 /// # Errors
 /// As [`prepare`] and [`Ready::publish`].
-pub fn write_whole(
+pub(crate) fn write_whole(
     path: &Path,
     existing: Existing,
     write: impl FnOnce(&mut Output) -> Result<()>,
@@ -211,7 +211,7 @@ pub fn write_whole(
 ///
 /// # Errors
 /// [`ErrorKind::Usage`], with the store.
-pub fn expect_outside_stores(path: &Path) -> Result<()> {
+pub(crate) fn expect_outside_stores(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     match real.ancestors().find(|folder| folder.join(STORE_FILE).is_file()) {
@@ -339,7 +339,7 @@ fn different_folder(path: &Path) -> Error {
 /// # Errors
 /// Those of `write`, and [`ErrorKind::Recipe`] where there is another folder. Only one that holds nothing but files
 /// that the new one has too is ever replaced.
-pub fn write_whole_folder(
+pub(crate) fn write_whole_folder(
     path: &Path,
     existing: Existing,
     write: impl FnOnce(&Folder) -> Result<()>,
@@ -396,7 +396,7 @@ pub fn prepare_bytes(path: &Path, existing: Existing, bytes: &[u8]) -> Result<Re
 ///
 /// # Errors
 /// [`ErrorKind::Recipe`] where another file has the name.
-pub fn put_in_place(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
+pub(crate) fn put_in_place(temporary: &Path, path: &Path, existing: Existing) -> Result<Made> {
     let failed = |error| Error::io("write", path, error);
     if existing == Existing::Replace {
         existing.expect_free(path)?;

@@ -56,22 +56,22 @@ fn mix_body(planes: &[f32], weights: &[f32], offset: f32, out: &mut [f32]) {
 compiled_for_each_kernel! {
     /// Expands a row along itself. Column 0 of `fine` lies on coarse sample 1; `coarse` needs half as many samples,
     /// rounded up, and two.
-    pub fn spread(coarse: &[f32], fine: &mut [f32]) = spread_body
+    pub(crate) fn spread(coarse: &[f32], fine: &mut [f32]) = spread_body
 }
 
 compiled_for_each_kernel! {
     /// Adds the expansion across rows on a coarse row, from it and its two neighbours.
-    pub fn add_even(rows: [&[f32]; 3], sum: &mut [f32]) = add_even_body
+    pub(crate) fn add_even(rows: [&[f32]; 3], sum: &mut [f32]) = add_even_body
 }
 
 compiled_for_each_kernel! {
     /// Adds the expansion half-way between two coarse rows.
-    pub fn add_odd(rows: [&[f32]; 2], sum: &mut [f32]) = add_odd_body
+    pub(crate) fn add_odd(rows: [&[f32]; 2], sum: &mut [f32]) = add_odd_body
 }
 
 compiled_for_each_kernel! {
     /// One row of `offset + sum of weight * plane`; planes lie one after the other.
-    pub fn mix(planes: &[f32], weights: &[f32], offset: f32, out: &mut [f32]) = mix_body
+    pub(crate) fn mix(planes: &[f32], weights: &[f32], offset: f32, out: &mut [f32]) = mix_body
 }
 
 #[cfg(test)]

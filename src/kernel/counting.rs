@@ -9,7 +9,7 @@ pub const STRIP: usize = 64;
 const ROWS: usize = 255;
 
 /// Thresholds of one strip.
-pub type Thresholds<const N: usize> = [[u8; STRIP]; N];
+pub(crate) type Thresholds<const N: usize> = [[u8; STRIP]; N];
 
 #[inline(always)]
 fn count_below_body<const N: usize>(
@@ -58,7 +58,7 @@ compiled_for_each_kernel! {
 
 compiled_for_each_kernel! {
     /// Adds to `counts` the number of rows whose codes lie below each threshold.
-    pub fn count_below(rows: &[&[u8; STRIP]], thresholds: &Thresholds<4>, counts: &mut [[u32; STRIP]; 4]) = count_below_body
+    pub(crate) fn count_below(rows: &[&[u8; STRIP]], thresholds: &Thresholds<4>, counts: &mut [[u32; STRIP]; 4]) = count_below_body
 }
 
 #[cfg(test)]

@@ -1,16 +1,16 @@
 //! The hot loops: plain Rust, always compiled and always the reference, beside SIMD chosen at run time.
 
-pub mod absolute_difference;
+pub(crate) mod absolute_difference;
 pub mod bounds;
 pub mod car;
 pub mod coherent;
-pub mod collapse;
+pub(crate) mod collapse;
 pub mod counting;
 pub mod noise;
-pub mod philox;
+pub(crate) mod philox;
 pub mod predict;
 pub mod project;
-pub mod ranking;
+pub(crate) mod ranking;
 
 /// Instructions to use, chosen once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ const MOST: i32 = 120;
 
 /// How `N` inputs are reduced to `D` numbers: `(sum of weights * inputs - offset) / 2^shift`, rounded, clamped to +-120.
 /// Sums wrap, so that no weights can break them.
-pub struct Projection<const N: usize, const D: usize> {
+pub(crate) struct Projection<const N: usize, const D: usize> {
     /// [dim, input].
     pub weights: [[i16; N]; D],
     /// [dim].
@@ -19,12 +19,12 @@ pub struct Projection<const N: usize, const D: usize> {
 
 compiled_for_each_kernel! {
     /// Reduces 72 inputs each to four numbers.
-    pub fn project_fine(inputs: &[[i16; 72]], projection: &Projection<72, 4>, out: &mut [[i8; 4]]) = project::<72, 4>
+    pub(crate) fn project_fine(inputs: &[[i16; 72]], projection: &Projection<72, 4>, out: &mut [[i8; 4]]) = project::<72, 4>
 }
 
 compiled_for_each_kernel! {
     /// Reduces 72 inputs each to eight numbers.
-    pub fn project_coarse(inputs: &[[i16; 72]], projection: &Projection<72, 8>, out: &mut [[i8; 8]]) = project::<72, 8>
+    pub(crate) fn project_coarse(inputs: &[[i16; 72]], projection: &Projection<72, 8>, out: &mut [[i8; 8]]) = project::<72, 8>
 }
 
 #[inline(always)]

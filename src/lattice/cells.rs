@@ -85,7 +85,7 @@ pub fn wave_counts(lattice: &Lattice, size: Size) -> Option<WaveCounts> {
 }
 
 /// How far a side is from whole numbers of cycles of the waves, at most 0.5. The height is axis 0, the width axis 1.
-pub fn misfit(waves: &[[f64; 2]], axis: usize, side: usize) -> f64 {
+pub(crate) fn misfit(waves: &[[f64; 2]], axis: usize, side: usize) -> f64 {
     let of = |wave: &[f64; 2]| {
         let cycles = wave[axis] * side as f64;
         (cycles - cycles.round()).abs()

@@ -54,7 +54,7 @@ impl Lattice {
 
     /// The waves that every shift of the lattice brings forward by whole cycles, in cycles a texel down and across: the
     /// dual basis of the shortest vectors. A shift s belongs to the lattice if w s is a whole number for each wave w.
-    pub fn waves(&self) -> Vec<[f64; 2]> {
+    pub(crate) fn waves(&self) -> Vec<[f64; 2]> {
         match *self {
             Self::None => Vec::new(),
             Self::OneDirection { period } => {

@@ -7,11 +7,11 @@ use crate::shape::Size;
 use crate::signal::fourier::Fourier;
 
 /// Shifts of at least so many texels down or across are far: not the texture's own grain.
-pub const FAR: usize = 12;
+pub(crate) const FAR: usize = 12;
 
 /// The largest circular autocorrelation at a far shift, -1 to 1; 0 of a picture that does not change, or that is too
 /// small to have far shifts.
-pub fn far_peak(picture: &Lightness) -> f64 {
+pub(crate) fn far_peak(picture: &Lightness) -> f64 {
     let Size { height, width } = picture.size;
     let mean = picture.mean();
     let fourier = Fourier::new(picture.size);
@@ -28,7 +28,7 @@ pub fn far_peak(picture: &Lightness) -> f64 {
 }
 
 /// Correlation of a picture with itself shifted by whole texels, over where both lie; 0 where they do not overlap.
-pub fn at_shift(picture: &Lightness, [down, right]: [isize; 2]) -> f64 {
+pub(crate) fn at_shift(picture: &Lightness, [down, right]: [isize; 2]) -> f64 {
     let Size { height, width } = picture.size;
     let (rows, columns) = (down.unsigned_abs(), right.unsigned_abs());
     if rows >= height || columns >= width {
@@ -45,7 +45,7 @@ pub fn at_shift(picture: &Lightness, [down, right]: [isize; 2]) -> f64 {
 }
 
 /// The largest correlation within a texel of a shift.
-pub fn near_shift(picture: &Lightness, shift: [f64; 2]) -> f64 {
+pub(crate) fn near_shift(picture: &Lightness, shift: [f64; 2]) -> f64 {
     let [y, x] = shift.map(|n| n.round() as isize);
     let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| [y + down, x + right]));
     around.map(|shift| at_shift(picture, shift)).fold(-1.0, f64::max)

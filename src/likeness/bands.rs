@@ -21,7 +21,7 @@ const TINY_SIMILARITY: f64 = 1e-6;
 
 /// Statistics of one picture.
 #[derive(Clone, Debug)]
-pub struct BandStatistics {
+pub(crate) struct BandStatistics {
     /// Of each band: log variance and a third of the kurtosis of the real part, autocorrelation of the magnitude at eight
     /// shifts; correlations of magnitudes between orientations and to the next coarser scale; skew and a third of the
     /// kurtosis of the picture.
@@ -40,7 +40,7 @@ struct Magnitude {
 
 impl BandStatistics {
     /// Of a picture.
-    pub fn of(picture: &Lightness) -> Self {
+    pub(crate) fn of(picture: &Lightness) -> Self {
         let mut joint = Vec::new();
         let mut amplitudes = Vec::new();
         let mut correlations = Vec::new();
@@ -75,12 +75,12 @@ impl BandStatistics {
     }
 
     /// Root mean square difference of the joint statistics.
-    pub fn distance(&self, other: &Self) -> f64 {
+    pub(crate) fn distance(&self, other: &Self) -> f64 {
         root_mean_square(&self.joint, &other.joint)
     }
 
     /// Mean dissimilarity of STSIM-2's terms: 0 to 1.
-    pub fn dissimilarity(&self, other: &Self) -> f64 {
+    pub(crate) fn dissimilarity(&self, other: &Self) -> f64 {
         let amplitudes = self
             .amplitudes
             .iter()

@@ -5,17 +5,17 @@ use super::Lightness;
 use crate::shape::Size;
 
 /// Number of grey levels.
-pub const LEVELS: usize = 16;
+pub(crate) const LEVELS: usize = 16;
 
 /// Pairs of texels (rows down, columns right) whose levels are counted.
 const OFFSETS: [[isize; 2]; 12] =
     [[0, 1], [1, 0], [1, 1], [-1, 1], [0, 2], [2, 0], [0, 4], [4, 0], [3, 3], [-3, 3], [0, 8], [8, 0]];
 
 /// Borders between levels.
-pub type Edges = [f64; LEVELS - 1];
+pub(crate) type Edges = [f64; LEVELS - 1];
 
 /// The values that cut a picture's texels into equal parts, interpolated between the two nearest.
-pub fn edges(picture: &Lightness) -> Edges {
+pub(crate) fn edges(picture: &Lightness) -> Edges {
     let mut sorted = picture.values.clone();
     sorted.sort_unstable_by(f64::total_cmp);
     std::array::from_fn(|n| {
@@ -27,7 +27,7 @@ pub fn edges(picture: &Lightness) -> Edges {
 }
 
 /// Shares of pairs of levels, [offset, level, level], either texel of a pair first.
-pub fn co_occurrence(picture: &Lightness, edges: &Edges) -> Vec<f64> {
+pub(crate) fn co_occurrence(picture: &Lightness, edges: &Edges) -> Vec<f64> {
     let Size { height, width } = picture.size;
     let levels: Vec<usize> =
         picture.values.iter().map(|value| edges.partition_point(|edge| edge < value)).collect();
@@ -52,6 +52,6 @@ pub fn co_occurrence(picture: &Lightness, edges: &Edges) -> Vec<f64> {
 }
 
 /// The share of pairs that would have to change, mean over offsets: 0 to 1.
-pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / (2.0 * OFFSETS.len() as f64)
 }

@@ -81,7 +81,7 @@ impl Judge {
     ///
     /// # Errors
     /// Those of [`Judge::judge`].
-    pub fn judge_partners(&self, pictures: &[Lightness]) -> Result<Judgement> {
+    pub(crate) fn judge_partners(&self, pictures: &[Lightness]) -> Result<Judgement> {
         self.judge_by(pictures, |picture, real| picture % self.reals.len() != real)
     }
 

@@ -44,7 +44,7 @@ impl Lightness {
     }
 
     /// Standard deviation of its values.
-    pub fn deviation(&self) -> f64 {
+    pub(crate) fn deviation(&self) -> f64 {
         variance(&self.values).sqrt()
     }
 

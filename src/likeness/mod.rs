@@ -10,7 +10,7 @@
 
 pub mod autocorrelation;
 pub mod bands;
-pub mod co_occurrence;
+pub(crate) mod co_occurrence;
 pub mod copies;
 mod draws;
 mod judge;
@@ -29,7 +29,7 @@ pub use lightness::Lightness;
 pub use statistics::{Measure, Statistics};
 
 /// Least side of a picture that is judged: the coarsest band of the pyramid then has 8 x 8 coefficients.
-pub const LEAST_SIDE: usize = 64;
+pub(crate) const LEAST_SIDE: usize = 64;
 
 /// Mean of values; 0 of none.
 pub(crate) fn mean(values: &[f64]) -> f64 {

@@ -19,7 +19,7 @@ const DIRECTIONS: usize = 32;
 
 /// For each scale, the projections of the same random patches on the same random directions: [direction, patch], each
 /// direction's in ascending order.
-pub fn projections(picture: &Lightness) -> Vec<Vec<f64>> {
+pub(crate) fn projections(picture: &Lightness) -> Vec<Vec<f64>> {
     let mut draws = Draws::of_seed_0();
     SCALES.iter().map(|&scale| projected(&picture.reduced(scale), &mut draws)).collect()
 }

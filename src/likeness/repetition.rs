@@ -13,19 +13,19 @@ const CUT: f64 = 3.0;
 
 /// The means of the rows and of the columns of a plane of codes that comes row by row.
 #[derive(Clone, Debug)]
-pub struct Profiles {
+pub(crate) struct Profiles {
     rows: Vec<u64>,
     columns: Vec<u64>,
 }
 
 impl Profiles {
     /// Of a plane of this width.
-    pub fn new(width: usize) -> Self {
+    pub(crate) fn new(width: usize) -> Self {
         Self { rows: Vec::new(), columns: vec![0; width] }
     }
 
     /// The next row.
-    pub fn push(&mut self, row: impl IntoIterator<Item = u8>) {
+    pub(crate) fn push(&mut self, row: impl IntoIterator<Item = u8>) {
         let mut sum = 0;
         for (code, column) in row.into_iter().zip(&mut self.columns) {
             let code = u64::from(code);
@@ -36,7 +36,7 @@ impl Profiles {
 
     /// Largest correlation of the rows' means with those about one side of the exemplar further down, and of the columns'
     /// means with those further right, -1 to 1; none where the plane has less than two sides.
-    pub fn bands(&self, exemplar: Size) -> [Option<f64>; 2] {
+    pub(crate) fn bands(&self, exemplar: Size) -> [Option<f64>; 2] {
         [(&self.rows, exemplar.height), (&self.columns, exemplar.width)].map(|(sums, side)| {
             let values: Vec<f64> = sums.iter().map(|&sum| sum as f64).collect();
             shifts(side, values.len())?

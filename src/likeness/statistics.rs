@@ -79,9 +79,4 @@ impl Statistics {
     pub fn peak(&self) -> f64 {
         self.peak
     }
-
-    /// Standard deviation of the picture.
-    pub fn deviation(&self) -> f64 {
-        self.deviation
-    }
 }

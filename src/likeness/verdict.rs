@@ -8,7 +8,7 @@ use super::autocorrelation::far_peak;
 use super::copies::LargestCopy;
 
 /// Sides of the window in the middle of an enlargement in which repetition is sought.
-pub const WINDOW_SIDE: usize = 512;
+pub(crate) const WINDOW_SIDE: usize = 512;
 
 /// What the cheap measures say.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -41,7 +41,7 @@ impl Stereo {
 
     /// The normal from the lights that fit it best: after a plain fit those with the largest residuals
     /// (shadows and highlights) are left out and the fit repeated.
-    pub fn robust_normal(&self, intensities: &[f64]) -> [f32; 3] {
+    pub(crate) fn robust_normal(&self, intensities: &[f64]) -> [f32; 3] {
         let mut estimate = self.solve(intensities);
         let keep = ((self.lights.len() as f64 * (1.0 - ROBUST_SHARE)).ceil() as usize).max(3);
         for _ in 0..ROBUST_ROUNDS {

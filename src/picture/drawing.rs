@@ -9,7 +9,7 @@ use crate::shape::Size;
 pub const CHARACTER: usize = 8;
 
 /// Colour of text.
-pub const INK: [f32; 3] = [0.1, 0.1, 0.12];
+pub(crate) const INK: [f32; 3] = [0.1, 0.1, 0.12];
 
 /// Colour of the paper.
 const PAPER: [f32; 3] = [1.0; 3];
@@ -52,7 +52,7 @@ impl Canvas {
     }
 
     /// A filled disc around a row and column.
-    pub fn disc(&mut self, [y, x]: [usize; 2], radius: usize, color: [f32; 3]) {
+    pub(crate) fn disc(&mut self, [y, x]: [usize; 2], radius: usize, color: [f32; 3]) {
         let side = 2 * radius + 1;
         for n in 0..side * side {
             let (down, right) = (n / side, n % side);
@@ -83,14 +83,14 @@ impl Canvas {
     }
 
     /// The same in characters `scale` times as large.
-    pub fn large_text(&mut self, [top, left]: [usize; 2], scale: usize, text: &str) {
+    pub(crate) fn large_text(&mut self, [top, left]: [usize; 2], scale: usize, text: &str) {
         for [y, x] in dots(text) {
             self.fill([top + scale * y, left + scale * x], Size::new(scale, scale), INK);
         }
     }
 
     /// The same read from below: the first character's top left corner is the text's bottom left one.
-    pub fn upward_text(&mut self, [bottom, left]: [usize; 2], scale: usize, text: &str) {
+    pub(crate) fn upward_text(&mut self, [bottom, left]: [usize; 2], scale: usize, text: &str) {
         for [y, x] in dots(text) {
             let top = bottom.saturating_sub(scale * (x + 1));
             self.fill([top, left + scale * y], Size::new(scale, scale), INK);

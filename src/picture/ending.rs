@@ -154,7 +154,7 @@ impl Encoding {
     ///
     /// # Errors
     /// [`crate::ErrorKind::Usage`] with the limit.
-    pub fn check_size(self, size: Size) -> Result<()> {
+    pub(crate) fn check_size(self, size: Size) -> Result<()> {
         let name = self.ending.name();
         let most = self.ending.most_side();
         if size.width.max(size.height) > most {
@@ -200,7 +200,7 @@ impl Encoding {
     ///
     /// # Errors
     /// [`crate::ErrorKind::Usage`] with what it needs.
-    pub fn check_memory(self, size: Size, least: u64, allowed: Allowance) -> Result<()> {
+    pub(crate) fn check_memory(self, size: Size, least: u64, allowed: Allowance) -> Result<()> {
         let needed = self.memory_bytes(size).saturating_add(least);
         if self.ending.streams() {
             return Ok(());

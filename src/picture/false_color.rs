@@ -16,7 +16,7 @@ pub fn index(size: Size, index: &[u16]) -> Picture {
 
 /// Each cluster in a colour that says how light it is among all of them, from dark blue over green to light yellow.
 /// `colors` are the linear RGB of the clusters.
-pub fn index_by_lightness(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Picture {
+pub(crate) fn index_by_lightness(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Picture {
     let luminance = |cluster: usize| {
         let [red, green, blue] = colors[cluster];
         0.2126 * red + 0.7152 * green + 0.0722 * blue

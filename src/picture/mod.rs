@@ -41,7 +41,7 @@ impl Meaning {
     }
 
     /// 16-bit display values of pixels, three a pixel.
-    pub fn encode_wide(self, pixels: &[[f32; 3]], samples: &mut [u16]) {
+    pub(crate) fn encode_wide(self, pixels: &[[f32; 3]], samples: &mut [u16]) {
         for (&value, to) in pixels.as_flattened().iter().zip(samples) {
             // What is no number is black.
             let value = if value > 0.0 { f64::from(value.min(1.0)) } else { 0.0 };
@@ -85,13 +85,6 @@ impl Picture {
         let pixels =
             self.bytes().chunks_exact(3).map(|p| std::array::from_fn(|c| f32::from(p[c]) / 255.0)).collect();
         Self::display(self.size, pixels)
-    }
-
-    /// All values times `exposure`.
-    #[must_use]
-    pub fn exposed(mut self, exposure: f64) -> Self {
-        self.pixels.iter_mut().flatten().for_each(|value| *value *= exposure as f32);
-        self
     }
 
     /// The picture of another size that repeats this one from its top left corner.

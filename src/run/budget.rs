@@ -4,7 +4,7 @@ use crate::error::{Error, ErrorKind, NO_THREADS, Result};
 use crate::words::counted;
 
 /// What the program takes before any work: its code, tables, the stacks and buffers of its threads.
-pub const OWN_BYTES: u64 = 12 << 20;
+pub(crate) const OWN_BYTES: u64 = 12 << 20;
 
 /// The least stack of the main thread.
 const STACK_BYTES: u64 = 256 << 10;
@@ -75,7 +75,7 @@ pub fn cannot_start(threads: usize, error: &dyn std::fmt::Display) -> Error {
 /// Bytes that the process may still map where its address space is limited (`ulimit -v`); half of what is left, since
 /// what is mapped is more than what is used.
 #[allow(clippy::disallowed_methods)] // the system's own files
-pub fn address_space_left() -> Option<u64> {
+pub(crate) fn address_space_left() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let used = std::fs::read_to_string("/proc/self/statm").ok()?;
     space_left(&limits, &used)

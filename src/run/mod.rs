@@ -3,7 +3,7 @@
 
 pub mod budget;
 pub mod progress;
-pub mod read_ahead;
+pub(crate) mod read_ahead;
 pub mod recipe;
 pub mod units;
 
@@ -105,13 +105,13 @@ impl<'a> Context<'a> {
     }
 
     /// Memory for the work itself.
-    pub fn work_bytes(&self) -> u64 {
+    pub(crate) fn work_bytes(&self) -> u64 {
         self.memory_bytes.saturating_sub(budget::OWN_BYTES)
     }
 
     /// Runs `work` on the pool that may take long, writes nothing and does not look for a stop: while it runs,
     /// [`Self::computing`] is set, and whoever started the program may end it.
-    pub fn compute<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+    pub(crate) fn compute<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
         self.computing.store(true, Ordering::SeqCst);
         let result = self.install(work);
         self.computing.store(false, Ordering::SeqCst);

@@ -8,10 +8,10 @@ use crate::error::Result;
 use crate::run::{Context, spawn};
 
 /// Values in flight where memory allows it: one in use, the next one being read or waiting for its turn.
-pub const IN_FLIGHT: usize = 2;
+pub(crate) const IN_FLIGHT: usize = 2;
 
 /// Values that may be in flight: [`IN_FLIGHT`], or 1 where memory does not hold so many of `value_bytes`.
-pub fn in_flight(allowed_bytes: u64, value_bytes: u64) -> usize {
+pub(crate) fn in_flight(allowed_bytes: u64, value_bytes: u64) -> usize {
     if value_bytes.saturating_mul(IN_FLIGHT as u64) <= allowed_bytes { IN_FLIGHT } else { 1 }
 }
 
@@ -25,7 +25,7 @@ pub fn in_flight(allowed_bytes: u64, value_bytes: u64) -> usize {
 /// # Errors
 /// Those of `work`, which is given those of `read`, and [`crate::ErrorKind::Stopped`] once a stop is asked for;
 /// [`crate::ErrorKind::Io`] where the system starts no thread.
-pub fn with<I: Send, T: Send, R>(
+pub(crate) fn with<I: Send, T: Send, R>(
     context: &Context<'_>,
     in_flight: usize,
     items: impl IntoIterator<Item = I, IntoIter: Send>,
@@ -59,7 +59,7 @@ pub fn with<I: Send, T: Send, R>(
 ///
 /// # Errors
 /// Those of [`with`].
-pub fn for_each<I: Send, T: Send>(
+pub(crate) fn for_each<I: Send, T: Send>(
     context: &Context<'_>,
     in_flight: usize,
     items: impl IntoIterator<Item = I, IntoIter: Send>,

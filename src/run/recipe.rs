@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 
 /// Version of the methods, part of every recipe: raised when a change makes other bytes, so that a newer
 /// program does not go on with what an older one left half-made.
-pub const METHOD: u64 = 1;
+pub(crate) const METHOD: u64 = 1;
 
 /// The settings of a result, beside which its recipe holds the stage that made it and the version of the method.
 pub trait Recipe: Serialize + DeserializeOwned {

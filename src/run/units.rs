@@ -13,7 +13,7 @@ use crate::run::{Context, spawn};
 ///
 /// # Errors
 /// Where memory does not even allow one.
-pub fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<usize> {
+pub(crate) fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<usize> {
     context.require(what, unit_bytes)?;
     let affordable = context.work_bytes() / unit_bytes.max(1);
     Ok((context.threads.max(1) as u64).min(affordable).max(1) as usize)
@@ -21,7 +21,7 @@ pub fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<u
 
 /// Works on every item on the threads of the pool that this is called in, on fewer of them where half the memory does
 /// not hold an item of `bytes` for each: results take the other half. They are in the order of the items.
-pub fn each_at_once<U: Sync, T: Send>(
+pub(crate) fn each_at_once<U: Sync, T: Send>(
     items: &[U],
     bytes: u64,
     context: &Context<'_>,

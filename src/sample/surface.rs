@@ -163,11 +163,6 @@ impl Surface {
         self.inner().map(|n| normal(self.texels[n].slope)).collect()
     }
 
-    /// Albedo of the base under the coat, [y, x], linear RGB.
-    pub fn albedo(&self) -> Vec<[f32; 3]> {
-        self.inner().map(|n| self.texels[n].albedo).collect()
-    }
-
     /// Padded positions of the texels, row by row.
     fn inner(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.height).flat_map(move |y| {

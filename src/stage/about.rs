@@ -6,9 +6,10 @@ use btfkit_formats::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::disk::lock::is_lock;
-use crate::disk::temporary;
 use crate::error::Result;
+pub use crate::stage::deepzoom::Pyramidal;
+pub use crate::stage::kept::Kept;
+use crate::stage::kept::bytes_below;
 use crate::stage::verify::is_pyramid;
 use crate::stage::{cluster, deepzoom, normals};
 use crate::store::enlarged::{self, Enlarged, Method};
@@ -32,19 +33,6 @@ pub enum About {
     Enlarged(Box<Grown>),
     /// A Deep Zoom pyramid.
     Deepzoom(Box<Pyramidal>),
-}
-
-/// What all stores have.
-#[derive(Clone, Debug, Serialize)]
-pub struct Kept {
-    /// Version of the program that began it.
-    pub version: String,
-    /// Version of its layout.
-    pub layout: u64,
-    /// Bytes of all its files.
-    pub stored_bytes: u64,
-    /// Whether nothing is left to be done.
-    pub finished: bool,
 }
 
 /// A list of directions.
@@ -192,30 +180,6 @@ pub struct Grown {
     pub shards: usize,
 }
 
-/// What a Deep Zoom pyramid is.
-#[derive(Clone, Debug, Serialize)]
-pub struct Pyramidal {
-    /// As of a store; the bytes are those of its tiles.
-    #[serde(flatten)]
-    pub kept: Kept,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Number of levels.
-    pub levels: u32,
-    /// Number of tiles of all levels.
-    pub tiles: u64,
-    /// Side of a tile without its overlap.
-    pub tile_side: usize,
-    /// Pixels of its neighbours that a tile holds.
-    pub overlap: usize,
-    /// Format of the tiles.
-    pub tile_format: &'static str,
-    /// What it shows, and how.
-    pub recipe: Value,
-}
-
 /// Tells what the store or pyramid at a path is.
 ///
 /// # Errors
@@ -312,22 +276,4 @@ fn of_enlarged(enlarged: &Enlarged, kept: impl Fn(u64, bool) -> Kept) -> Grown {
         shards_done: done,
         shards: total,
     }
-}
-
-/// Bytes of all files below a folder, but for those of writers at work. Links are not followed.
-pub(crate) fn bytes_below(folder: &Path) -> u64 {
-    let (mut bytes, mut folders) = (0u64, vec![folder.to_owned()]);
-    while let Some(at) = folders.pop() {
-        for entry in std::fs::read_dir(&at).into_iter().flatten().flatten() {
-            let path = entry.path();
-            match entry.metadata() {
-                Ok(data) if data.is_dir() => folders.push(path),
-                Ok(data) if data.is_file() && !temporary::is_temporary(&path) && !is_lock(&path) => {
-                    bytes = bytes.saturating_add(data.len());
-                }
-                _ => {}
-            }
-        }
-    }
-    bytes
 }

@@ -38,13 +38,13 @@ impl Beyond {
     }
 
     /// Counts samples that are not finite, which count as black before they get here.
-    pub fn count_not_finite(&self, count: u64) {
+    pub(crate) fn count_not_finite(&self, count: u64) {
         let mut found = self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         found.not_finite += count;
     }
 
     /// Counts pixels, if they are light.
-    pub fn count_pixels(&self, meaning: Meaning, pixels: &[[f32; 3]]) {
+    pub(crate) fn count_pixels(&self, meaning: Meaning, pixels: &[[f32; 3]]) {
         if meaning == Meaning::Linear {
             self.count(pixels.as_flattened().iter().map(|&value| f64::from(value)));
         }
@@ -79,7 +79,7 @@ pub struct Takes {
 }
 
 /// What a format does not hold of a measurement, whatever its values are, a sentence each.
-pub fn of_format(description: &Description, takes: Takes) -> Vec<String> {
+pub(crate) fn of_format(description: &Description, takes: Takes) -> Vec<String> {
     let mut notes = Vec::new();
     let bits = match description.sample_type {
         SampleType::U8 => 8,

@@ -12,6 +12,7 @@ pub mod fit;
 pub mod image;
 pub mod import;
 pub mod judge;
+pub(crate) mod kept;
 pub mod loss;
 pub mod normals;
 pub mod sample;

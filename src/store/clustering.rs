@@ -30,7 +30,7 @@ use crate::zarr::{Layout, Store};
 pub const KIND: &str = "clustering";
 
 /// The passes of a clustering.
-pub struct Passes {
+pub(crate) struct Passes {
     store: Store,
     _lock: Lock,
 }
@@ -144,7 +144,7 @@ impl Passes {
     ///
     /// # Errors
     /// [`crate::ErrorKind::Recipe`] where another recipe's lie there.
-    pub fn create(path: &Path, recipe: &Value, context: &Context<'_>) -> Result<Self> {
+    pub(crate) fn create(path: &Path, recipe: &Value, context: &Context<'_>) -> Result<Self> {
         let mut store = Store::at(path);
         let lock = store.begin_by_recipe(KIND, recipe, json!({}), context)?;
         Ok(Self { store, _lock: lock })
@@ -152,12 +152,12 @@ impl Passes {
 
     /// Removes all of it, as far as no other process is writing there: what is left is never read again, and
     /// removed by whoever comes next.
-    pub fn remove(path: &Path) {
+    pub(crate) fn remove(path: &Path) {
         let _ = std::fs::remove_dir_all(path);
     }
 
     /// The latest pass that can begin.
-    pub fn latest(&self) -> Result<Option<usize>> {
+    pub(crate) fn latest(&self) -> Result<Option<usize>> {
         let entries = match std::fs::read_dir(self.store.path()) {
             Ok(entries) => entries,
             Err(error) => return Err(Error::io("list", self.store.path(), error)),
@@ -175,7 +175,7 @@ impl Passes {
     }
 
     /// What a pass begins with; `brdf` are its views and lights, `slots` those of all texels.
-    pub fn state(&self, pass: usize, brdf: [usize; 2], slots: usize) -> Result<State> {
+    pub(crate) fn state(&self, pass: usize, brdf: [usize; 2], slots: usize) -> Result<State> {
         let name = pass_name(pass);
         let history = self.attributes(&name)?.ok_or_else(|| {
             Error::missing(format!("{}: {name} is not there yet", self.store.path().display()))
@@ -200,7 +200,7 @@ impl Passes {
     }
 
     /// Writes what a pass begins with, and removes what the passes before it left.
-    pub fn write_state(&self, pass: usize, brdf: [usize; 2], state: &State) -> Result<()> {
+    pub(crate) fn write_state(&self, pass: usize, brdf: [usize; 2], state: &State) -> Result<()> {
         let name = pass_name(pass);
         let shape = [state.centres.len() / (brdf[0] * brdf[1]), brdf[0], brdf[1]];
         let layout = Layout::small::<u8>(&["cluster", "view", "light"], &shape);
@@ -217,12 +217,12 @@ impl Passes {
     }
 
     /// Whether a part of a pass is done.
-    pub fn has_part(&self, pass: usize, part: usize) -> Result<bool> {
+    pub(crate) fn has_part(&self, pass: usize, part: usize) -> Result<bool> {
         Ok(self.attributes::<PartAttributes>(&part_name(pass, part))?.is_some())
     }
 
     /// What a pass found in a part of `slots` slots.
-    pub fn part(
+    pub(crate) fn part(
         &self,
         pass: usize,
         part: usize,
@@ -248,7 +248,7 @@ impl Passes {
     }
 
     /// Writes what a pass found in a part.
-    pub fn write_part(&self, pass: usize, part: usize, found: &Found) -> Result<()> {
+    pub(crate) fn write_part(&self, pass: usize, part: usize, found: &Found) -> Result<()> {
         let name = part_name(pass, part);
         let (texels, counts) = found.tally.parts();
         let layout = Layout::small::<u16>(&["slot"], &[found.index.len()]);

@@ -115,7 +115,7 @@ impl Store {
     ///
     /// # Errors
     /// [`crate::ErrorKind::Recipe`] where another recipe's store lies there.
-    pub fn begin_by_recipe(
+    pub(crate) fn begin_by_recipe(
         &mut self,
         kind: &str,
         recipe: &Value,

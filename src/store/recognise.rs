@@ -24,10 +24,10 @@ pub const VERSION_2: [&str; 4] = [".zgroup", ".zarray", ".zmetadata", ".zattrs"]
 const MOST_ENTRIES: usize = 10_000;
 
 /// The file that says what a Deep Zoom pyramid holds, in the folder of its tiles.
-pub const PYRAMID_STATE: &str = "btfkit.json";
+pub(crate) const PYRAMID_STATE: &str = "btfkit.json";
 
 /// The ending of the folder of a pyramid's tiles, in place of `.dzi`.
-pub const PYRAMID_FOLDER: &str = "_files";
+pub(crate) const PYRAMID_FOLDER: &str = "_files";
 
 /// What is no store of ours.
 pub(super) struct Other {

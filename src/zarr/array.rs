@@ -190,7 +190,7 @@ impl Store {
     }
 
     /// Makes an array ready to be written chunk by chunk; its metadata is written, its data is not touched.
-    pub fn create_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
+    pub(crate) fn create_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
         let array = self.build(name, layout)?;
         let options = ArrayMetadataOptions::default().with_include_zarrs_metadata(false);
         array.inner.store_metadata_opt(&options).map_err(|error| write_error(&error.into()))?;
@@ -237,7 +237,7 @@ impl Store {
     ///
     /// # Errors
     /// [`ErrorKind::Missing`] where there is none, [`ErrorKind::Input`] where its metadata are not those of the layout.
-    pub fn open_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
+    pub(crate) fn open_array(&self, name: &str, layout: &Layout<'_>) -> Result<Array> {
         let document = self.array_document(name);
         self.unless_made_anew(document.and_then(|document| self.check_document(name, layout, &document)))
     }
@@ -284,7 +284,12 @@ impl Store {
     }
 
     /// Encodes and writes one chunk (or shard) of an array, all-zero ones too.
-    pub fn write_chunk<T: Named>(&self, array: &Array, indices: &[u64], elements: Vec<T>) -> Result<()> {
+    pub(crate) fn write_chunk<T: Named>(
+        &self,
+        array: &Array,
+        indices: &[u64],
+        elements: Vec<T>,
+    ) -> Result<()> {
         // One thread: a shard's bytes must not depend on which of its chunks was encoded first.
         let options = CodecOptions::default().with_store_empty_chunks(true).with_concurrent_target(1);
         array.inner.store_chunk_opt(indices, elements, &options).map_err(|error| write_error(&error))
@@ -296,7 +301,7 @@ impl Store {
     }
 
     /// The file of a chunk (or shard).
-    pub fn chunk_path(&self, array: &Array, indices: &[u64]) -> PathBuf {
+    pub(crate) fn chunk_path(&self, array: &Array, indices: &[u64]) -> PathBuf {
         self.storage.path(&array.inner.chunk_key(indices))
     }
 }

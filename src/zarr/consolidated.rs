@@ -49,7 +49,7 @@ impl Store {
     ///
     /// # Errors
     /// Those of reading.
-    pub fn is_consolidated(&self, arrays: &[String]) -> Result<bool> {
+    pub(crate) fn is_consolidated(&self, arrays: &[String]) -> Result<bool> {
         let document = read_object(&self.metadata_path(""))?.unwrap_or_default();
         Ok(document.get(MEMBER) == Some(&self.consolidated(arrays)?))
     }

@@ -17,7 +17,7 @@ use crate::run::recipe;
 pub const FORMAT: u64 = 2;
 
 /// The oldest version that is read: without seals, checksums and angle coordinates.
-pub const OLDEST_FORMAT: u64 = 1;
+pub(crate) const OLDEST_FORMAT: u64 = 1;
 
 /// The file of metadata of a group or an array.
 pub(crate) const FILE: &str = "zarr.json";

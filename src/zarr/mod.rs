@@ -107,12 +107,12 @@ impl Store {
     }
 
     /// Removes what killed writers left.
-    pub fn sweep(&self) -> Result<()> {
+    pub(crate) fn sweep(&self) -> Result<()> {
         self.storage.sweep()
     }
 
     /// Whether all chunks (or shards) of an array are there.
-    pub fn has_all(&self, array: &Array) -> bool {
+    pub(crate) fn has_all(&self, array: &Array) -> bool {
         let grid = array.grid();
         places::places(&vec![0; grid.len()], &grid).all(|place| self.has_chunk(array, &place))
     }
@@ -221,7 +221,7 @@ impl Store {
     }
 
     /// Writes the group's metadata with our attributes, sealed; `group` is "" for the root.
-    pub fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
+    pub(crate) fn write_group(&self, group: &str, attributes: Map<String, Value>) -> Result<()> {
         self.write_group_with(group, attributes, Map::new())
     }
 
@@ -264,12 +264,12 @@ impl Store {
     }
 
     /// Whether a chunk (or shard) has been written.
-    pub fn has_chunk(&self, array: &Array, indices: &[u64]) -> bool {
+    pub(crate) fn has_chunk(&self, array: &Array, indices: &[u64]) -> bool {
         self.chunk_path(array, indices).is_file()
     }
 
     /// Whether a shard is there and not cut off: its index is intact, its chunks are not looked at.
-    pub fn has_shard(&self, array: &Array, indices: &[u64]) -> bool {
+    pub(crate) fn has_shard(&self, array: &Array, indices: &[u64]) -> bool {
         let path = self.chunk_path(array, indices);
         let chunks = array.shard_chunks().unwrap_or(0);
         path.is_file() && mapped::open(&path).and_then(|file| shard::has_index(file, chunks)).unwrap_or(false)

@@ -64,7 +64,7 @@ impl Store {
     /// # Errors
     /// [`crate::ErrorKind::Missing`] where a part of it has not been written, [`crate::ErrorKind::Input`] where one is
     /// damaged; both name the file.
-    pub fn read_box<T: Named>(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<T>> {
+    pub(crate) fn read_box<T: Named>(&self, array: &Array, start: &[u64], extent: &[u64]) -> Result<Vec<T>> {
         let refused =
             |what: String| Error::input(format!("{}: {}: {what}", self.path().display(), array.name));
         let shape = &array.shape;

@@ -37,7 +37,7 @@ impl MappedStorage {
     }
 
     /// Removes what killed writers left behind: temporary files that nobody holds.
-    pub fn sweep(&self) -> Result<()> {
+    pub(crate) fn sweep(&self) -> Result<()> {
         sweep(&self.root)
     }
 }

@@ -126,7 +126,9 @@ fn names_that_were_exchanged_or_are_of_something_else_are_told_with_the_way_out(
     succeed(&mut run(&["import"], &[&archive, &other], &["--turn", "90", "-q"]));
     let archives = at("archives");
     std::fs::create_dir(&archives).unwrap();
-    ["1.zip", "2.zip"].iter().for_each(|name| drop(std::fs::copy(&archive, archives.join(name)).unwrap()));
+    ["1.zip", "2.zip"].iter().for_each(|name| {
+        std::fs::copy(&archive, archives.join(name)).unwrap();
+    });
     let notes = at("notes");
     std::fs::create_dir(&notes).unwrap();
     std::fs::write(notes.join("readme.txt"), "mine").unwrap();

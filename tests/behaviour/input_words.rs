@@ -185,13 +185,17 @@ fn a_store_in_the_place_of_an_archive_is_told() {
             66,
             "archives come first, and the store to make is named last",
         ),
-        (vec![store.clone(), folder.path().join("new.zarr")], 65, "got a store, expected an archive"),
-        (vec![store.clone()], 65, "got a store, expected an archive"),
+        (vec![store.clone(), folder.path().join("new.zarr")], 2, "is a store already"),
+        (vec![store.clone()], 2, "is a store already"),
     ] {
         let said = fail(btf().arg("import").args(&named), code);
         assert!(said.contains(words), "{named:?}: {said}");
     }
     assert_eq!(std::fs::read(store.join("zarr.json")).unwrap(), before);
+    let foreign = folder.path().join("foreign");
+    std::fs::create_dir(&foreign).unwrap();
+    std::fs::write(foreign.join("zarr.json"), "{\"zarr_format\": 3, \"node_type\": \"group\"}").unwrap();
+    assert!(fail(btf().arg("import").arg(&foreign), 65).contains("got a store, expected an archive"));
 }
 
 #[test]

@@ -168,7 +168,7 @@ pub(super) fn read_rotations(reader: &mut Reader<'_>, limits: &Limits) -> Result
     let number = reader.u32_le()?;
     if u64::from(number) > limits.max_pixels_per_image {
         let expected = format!("at most {}", limits.max_pixels_per_image);
-        return Err(Error::new(ErrorKind::Limit, format!("{}", counted(number, "rotation")), expected).at(at));
+        return Err(Error::new(ErrorKind::Limit, counted(number, "rotation").to_string(), expected).at(at));
     }
     let bytes = reader.take(length(number).saturating_mul(36))?;
     let (numbers, _) = bytes.as_chunks::<4>();

@@ -74,7 +74,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Image> {
     let expected = pixels.saturating_mul(u64::from(header.channels));
     if u64::try_from(samples.len()).ok() != Some(expected) {
         return Err(Error::malformed(
-            format!("{}", counted(samples.len(), "decoded sample")),
+            counted(samples.len(), "decoded sample").to_string(),
             format!("{expected}, for {} x {} x {}", header.width, header.height, header.channels),
         ));
     }

@@ -2,7 +2,7 @@
 //! are not square (JFIF).
 
 use super::marker;
-use crate::picture::{aspect, orientation, profile};
+use crate::picture::{aspect, exif, orientation, profile};
 use crate::reader::Reader;
 
 /// What is said if it is not sRGB; nothing where the segments are damaged, as whoever reads the picture finds that.
@@ -16,8 +16,8 @@ pub(crate) fn profile(bytes: &[u8]) -> Option<String> {
             }
             marker::APP1 => {
                 let (block, packet) =
-                    (segment.strip_prefix(orientation::EXIF), segment.strip_prefix(orientation::XMP));
-                exif = exif.or_else(|| block.and_then(profile::of_exif));
+                    (segment.strip_prefix(exif::MARK), segment.strip_prefix(orientation::XMP));
+                exif = exif.or_else(|| block.and_then(exif::colours));
                 xmp = xmp.or_else(|| packet.and_then(profile::of_xmp));
             }
             _ => {}

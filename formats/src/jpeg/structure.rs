@@ -6,7 +6,7 @@ use super::Header;
 use super::frame::{Arrangement, Frame, Scanned};
 use super::huffman::{Slot, Table};
 use super::marker;
-use crate::picture::orientation;
+use crate::picture::exif;
 use crate::reader::Reader;
 use crate::words::counted;
 use crate::{Error, ErrorKind, Limits, Result};
@@ -178,7 +178,7 @@ fn is_jfif_segment(segment: &[u8]) -> bool {
 /// The orientation in a segment of Exif or XMP data; the first one that is found counts.
 fn read_orientation(reader: &mut Reader<'_>, before: u8) -> Result<u8> {
     let segment = marker::segment(reader)?;
-    Ok(if before == 1 { orientation::of_segment(segment) } else { before })
+    Ok(if before == 1 { exif::orientation_of_segment(segment) } else { before })
 }
 
 fn read_restart_interval(reader: &mut Reader<'_>) -> Result<u64> {

@@ -1,8 +1,7 @@
 //! What a picture says of its colours, where that is not what integers are taken for: sRGB. Nothing of it is applied;
 //! the caller is told.
 
-use super::orientation::EXIF;
-use super::{tiff, xmp};
+use super::xmp;
 use crate::reader::Reader;
 
 /// Longest name of a profile that is told, characters.
@@ -57,13 +56,6 @@ pub(crate) fn of_chromaticities(found: &[f64]) -> Option<String> {
     }
     let told: Vec<String> = found.iter().take(8).map(|value| format!("{value:.4}")).collect();
     Some(format!("the primaries {}", told.join(" ")))
-}
-
-/// Of a block of Exif data: a colour space that is none or another than sRGB, as cameras state Adobe RGB.
-pub(crate) fn of_exif(block: &[u8]) -> Option<String> {
-    let block = block.strip_prefix(EXIF).unwrap_or(block);
-    // As for the orientation: not every camera writes the offset of a next directory behind the last.
-    of_exif_space(tiff::exif_colour_space(&[block, &[0; 8]].concat()).ok().flatten())
 }
 
 /// Of the number of a colour space in Exif data.

@@ -200,7 +200,7 @@ fn zero_bytes_follow_their_neighbours() {
     let found = values(&database);
     assert_near(found[1], 1.0);
     assert_near(found[5], 2.0);
-    assert!(database.contents().assumptions.iter().any(|text| text.contains("settled by continuity: 2.")));
+    assert!(database.contents().assumptions.iter().any(|text| text.contains("resolved by continuity: 2.")));
 
     let known = ZeroBytes::parse("PDF6Dscale 0 1 2.0 text\nPDF6Dscale 1 2 1.000001 text").unwrap();
     let database = Database::open(&bytes, &known, &Limits::default()).unwrap();

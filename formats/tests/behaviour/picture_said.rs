@@ -115,7 +115,7 @@ fn pixels_that_are_not_square_are_told_by_every_format() {
     let hdr = |line: &str| hdr_of(&format!("{RGBE}{line}"), "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat);
     for (bytes, place) in [
         (png(&[phys(100, 200)]), "pHYs"),
-        (png(&[png_chunk(b"sCAL", b"\x012.0\01e0")]), "sCAL"),
+        (png(&[png_chunk(b"sCAL", b"\x012.0\x001e0")]), "sCAL"),
         (jpeg(&[jfif(36, 72)]), "JFIF"),
         (tiff(&[(282, vec![50]), (283, vec![100])]), "resolutions"),
         (tiff(&[(33550, vec![2, 1, 0])]), "ModelPixelScale"),
@@ -345,8 +345,14 @@ fn a_turn_is_told_wherever_it_stands() {
 fn levels_of_black_and_white_are_told() {
     // Of rationals the helper writes the halves, so that these are whole numbers of a list here.
     let full = vec![0, 255, 0, 255, 0, 255];
-    for tags in [vec![], vec![(532, full.clone())], vec![(50714, vec![0, 0, 0])], vec![(50717, vec![255; 3])]]
-    {
+    for tags in [
+        vec![],
+        vec![(281, vec![255])],
+        vec![(281, vec![200])],
+        vec![(532, full.clone())],
+        vec![(50714, vec![0, 0, 0])],
+        vec![(50717, vec![255; 3])],
+    ] {
         assert_eq!(said(&tiff(&tags)).profile, None);
     }
     for (tags, told) in [
@@ -355,6 +361,7 @@ fn levels_of_black_and_white_are_told() {
         (vec![(50714, vec![0, 4, 0])], "the black level [0.0, 4.0, 0.0]"),
         (vec![(50717, vec![200])], "the white level [200.0]"),
         (vec![(50712, vec![0, 1])], "a linearization table"),
+        (vec![(281, vec![127])], "the largest sample value [127.0]"),
         (vec![(291, vec![0])], "a grey response curve"),
         (vec![(50714, vec![9]), (50717, vec![200])], "the black level [9.0], with the white level [200.0]"),
         (

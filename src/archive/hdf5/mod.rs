@@ -41,7 +41,7 @@ pub fn recognise(bytes: &[u8]) -> bool {
 
 /// The error of a program built without HDF5 that meets such a file.
 #[cfg(not(feature = "hdf5"))]
-pub fn not_built_in(path: &std::path::Path) -> crate::Error {
+pub(crate) fn not_built_in(path: &std::path::Path) -> crate::Error {
     crate::Error::usage(format!("{}: an HDF5 file, which this program was built without", path.display()))
         .hint("install HDF5's headers (Debian: libhdf5-dev) and build with `cargo build --release --features hdf5`")
 }

@@ -43,11 +43,11 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 
-pub use super::Kernel;
+pub(crate) use super::Kernel;
 use super::dispatch;
 
 /// Bytes to whose multiple groups are padded.
-pub const LANE_BYTES: usize = 64;
+pub(crate) const LANE_BYTES: usize = 64;
 
 /// Texels and centres of a tile.
 const TILE: usize = 4;
@@ -133,7 +133,13 @@ impl Kernel {
     }
 
     /// The distance of a texel to a centre if it is below `limit`; groups after the sum has reached that are not read.
-    pub fn distance_below(self, point: &[u8], centre: &[u8], groups: &[Group], limit: u64) -> Option<u64> {
+    pub(crate) fn distance_below(
+        self,
+        point: &[u8],
+        centre: &[u8],
+        groups: &[Group],
+        limit: u64,
+    ) -> Option<u64> {
         let mut distance = 0;
         for group in groups {
             let range = group.start..group.end;

@@ -23,7 +23,7 @@ pub fn unpack(position: u32) -> [i32; 2] {
 
 /// What a sub-pass works with, beside the positions.
 #[derive(Clone, Copy)]
-pub struct Subpass<'a, const D: usize> {
+pub(crate) struct Subpass<'a, const D: usize> {
     /// Positions of a row of the region.
     pub width: usize,
     /// First row and first column to correct, one after the last; every other one is, and at least two lie around them.
@@ -46,7 +46,7 @@ pub struct Subpass<'a, const D: usize> {
 
 /// The cost of coming from the same row or column of the exemplar as sites one side of the exemplar away.
 #[derive(Clone, Copy)]
-pub struct Repetition<'a> {
+pub(crate) struct Repetition<'a> {
     /// The positions as they were when the pass began.
     pub before: &'a [u32],
     /// Sides of the exemplar in texels of the level.
@@ -65,7 +65,7 @@ const NEIGHBOURS: [[i32; 2]; 8] = [[0, -1], [0, 1], [-1, 0], [-1, -1], [-1, 1], 
 const SITES: usize = 12;
 
 /// Corrects positions at a level of `D` dimensions, a multiple of four.
-pub fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
+pub(crate) fn correct<const D: usize>(kernel: Kernel, positions: &mut [u32], subpass: &Subpass<'_, D>) {
     dispatch!(
         kernel;
         correct_by::<D, Plain>(positions, subpass),

@@ -19,7 +19,7 @@ pub use lane::Lane;
 use mode::{DISTANCES, Mode};
 
 /// Samples beyond the end of a plane that kernels may overwrite.
-pub const SLACK: usize = 32;
+pub(crate) const SLACK: usize = 32;
 
 /// Extent of a chunk without its channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

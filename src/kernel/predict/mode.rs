@@ -24,7 +24,7 @@ pub enum Weight {
 }
 
 /// Distances to the lights around it, coarsest first: lights whose number is an odd multiple of the distance.
-pub const DISTANCES: [usize; 3] = [4, 2, 1];
+pub(crate) const DISTANCES: [usize; 3] = [4, 2, 1];
 
 /// Prediction of one channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,13 +47,13 @@ impl Weight {
 
 impl Mode {
     /// The byte: two bits each for the spatial predictor (lowest) and the weights.
-    pub fn to_byte(self) -> u8 {
+    pub(crate) fn to_byte(self) -> u8 {
         let [a, b, c] = self.weights.map(|weight| weight as u8);
         self.spatial as u8 | a << 2 | b << 4 | c << 6
     }
 
     /// The mode of a byte, if it is one.
-    pub fn from_byte(byte: u8) -> Option<Self> {
+    pub(crate) fn from_byte(byte: u8) -> Option<Self> {
         let bits = |at: u8| usize::from(byte >> at & 3);
         let weight = |at| Weight::ALL.get(bits(at)).copied();
         Some(Self { spatial: *Spatial::ALL.get(bits(0))?, weights: [weight(2)?, weight(4)?, weight(6)?] })

@@ -23,13 +23,13 @@ mod avx2;
 mod avx512;
 
 /// Most candidates.
-pub const CAPACITY: usize = 48;
+pub(crate) const CAPACITY: usize = 48;
 
 /// Ranks that are found.
-pub const RANKS: usize = 16;
+pub(crate) const RANKS: usize = 16;
 
 /// Queries ranked at a time.
-pub const BATCH: usize = 16;
+pub(crate) const BATCH: usize = 16;
 
 /// Bits of a key that hold a slot.
 #[cfg(target_arch = "x86_64")]
@@ -80,7 +80,7 @@ impl Candidates {
     /// Asks the memory for the candidates, to be there when they are ranked.
     #[inline]
     #[allow(unsafe_code)]
-    pub fn prefetch(&self) {
+    pub(crate) fn prefetch(&self) {
         #[cfg(target_arch = "x86_64")]
         for line in 0..size_of::<Self>() / 64 {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::shape::Size;
 
 /// Shortest side of a tile that patches with overlaps are cut from.
-pub const LEAST_SIDE: usize = 8;
+pub(crate) const LEAST_SIDE: usize = 8;
 
 /// Binary places of the greatest distance as a whole number: all that an f32 has.
 const DISTANCE_BITS: i32 = 24;

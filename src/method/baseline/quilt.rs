@@ -113,7 +113,7 @@ impl<'a> Quilt<'a> {
     }
 
     /// The tile's texels of the next rows, all columns row by row; `None` after the last.
-    pub fn next_rows(&mut self) -> Option<Vec<u32>> {
+    pub(crate) fn next_rows(&mut self) -> Option<Vec<u32>> {
         let step = self.block - self.overlap;
         let rows = self.size.height.div_ceil(step);
         if self.row == rows {

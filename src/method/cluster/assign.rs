@@ -10,7 +10,7 @@ use crate::kernel::bounds::{Upper, advance};
 const TOGETHER: usize = 64;
 
 /// What a pass assigns by.
-pub struct Assignment<'a> {
+pub(crate) struct Assignment<'a> {
     /// The centres to assign to.
     pub centres: Centres<'a>,
     /// Which centres share a bound.
@@ -37,7 +37,7 @@ pub struct Texels<'a> {
 
 impl Assignment<'_> {
     /// Assigns every texel to its nearest centre, ties to the smaller number. Returns the texel nearest to each centre.
-    pub fn assign(&self, texels: &mut Texels<'_>) -> Vec<Near> {
+    pub(crate) fn assign(&self, texels: &mut Texels<'_>) -> Vec<Near> {
         let stride = self.centres.arrangement.stride();
         let none = || vec![Near::NONE; self.centres.count()];
         let parts = texels.vectors.par_chunks(TOGETHER * stride).zip(texels.numbers.par_chunks(TOGETHER));

@@ -28,7 +28,7 @@ impl Steps {
     }
 
     /// The fewest steps that are certainly no less than a distance.
-    pub fn ceiling(self, distance: u64) -> u16 {
+    pub(crate) fn ceiling(self, distance: u64) -> u16 {
         self.floor(distance).saturating_add(1)
     }
 }
@@ -124,7 +124,7 @@ impl Centres<'_> {
     }
 
     /// Distance of each centre to where it was before.
-    pub fn drifts(&self, before: &[u8]) -> Vec<u64> {
+    pub(crate) fn drifts(&self, before: &[u8]) -> Vec<u64> {
         let stride = self.arrangement.stride();
         let pairs = self.vectors.par_chunks_exact(stride).zip(before.par_chunks_exact(stride));
         pairs
@@ -134,7 +134,7 @@ impl Centres<'_> {
 }
 
 /// What a pass knows of its centres before it looks at a texel.
-pub struct Guide {
+pub(crate) struct Guide {
     drift: Vec<u16>,
     between: Vec<u16>,
     reach: Vec<u16>,
@@ -142,7 +142,7 @@ pub struct Guide {
 
 impl Guide {
     /// For centres that lay at `before` in the last pass, where the texel nearest to each was at `nearest`.
-    pub fn new(
+    pub(crate) fn new(
         centres: &Centres<'_>,
         columns: &Columns,
         steps: Steps,
@@ -173,7 +173,7 @@ impl Guide {
     }
 
     /// What the texels of a cluster are pruned by.
-    pub fn of(&self, cluster: u16) -> bounds::Columns<'_> {
+    pub(crate) fn of(&self, cluster: u16) -> bounds::Columns<'_> {
         let count = self.drift.len();
         let between = &self.between[usize::from(cluster) * count..][..count];
         bounds::Columns { drift: &self.drift, between, reach: &self.reach }

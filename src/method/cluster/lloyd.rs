@@ -56,7 +56,7 @@ impl Pass {
 }
 
 /// Tells the last pass beside the bar, and how many may follow; `each` is the time that one takes, where it is known.
-pub fn announce(passes: &[Pass], limits: Limits, each: Option<Duration>, context: &Context<'_>) {
+pub(crate) fn announce(passes: &[Pass], limits: Limits, each: Option<Duration>, context: &Context<'_>) {
     let Some(Pass { mean_lightness_error, moved, .. }) = passes.last() else { return };
     let (number, left) = (passes.len(), limits.passes_left(passes));
     let time = each.map_or(String::new(), |each| format!(", {:.0} s", each.as_secs_f64() * left as f64));
@@ -78,7 +78,7 @@ impl Limits {
     }
 
     /// How many passes may follow: gains are taken to go on shrinking as the last two did.
-    pub fn passes_left(&self, passes: &[Pass]) -> usize {
+    pub(crate) fn passes_left(&self, passes: &[Pass]) -> usize {
         let most = self.passes.saturating_sub(passes.len());
         let gain = |n: usize| 1.0 - passes[n].objective as f64 / (passes[n - 1].objective as f64).max(1.0);
         let Some(last) = passes.len().checked_sub(1).filter(|&last| last >= 2) else { return most };

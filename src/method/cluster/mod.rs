@@ -10,14 +10,14 @@ pub mod nearest;
 pub mod points;
 pub mod search;
 pub mod seeding;
-pub mod selection;
-pub mod tally;
+pub(crate) mod selection;
+pub(crate) mod tally;
 
 use bounds::Centres;
 use points::Arrangement;
 
 /// Sum of the distances of texels [texel, stride] from the centres, or what stands for them, of their clusters.
-pub fn total_distance(points: &[u8], index: &[u16], centres: &Centres<'_>) -> u64 {
+pub(crate) fn total_distance(points: &[u8], index: &[u16], centres: &Centres<'_>) -> u64 {
     use rayon::prelude::*;
     let (stride, groups) = (centres.arrangement.stride(), centres.arrangement.groups());
     let texels = points.par_chunks_exact(stride).zip(index);
@@ -27,7 +27,7 @@ pub fn total_distance(points: &[u8], index: &[u16], centres: &Centres<'_>) -> u6
 }
 
 /// Distances D of (26) between BRDFs of L* codes [brdf, view, light], in L* units: symmetric, row by row.
-pub fn distance_matrix(brdfs: &[u8], arrangement: &Arrangement) -> Vec<f32> {
+pub(crate) fn distance_matrix(brdfs: &[u8], arrangement: &Arrangement) -> Vec<f32> {
     use rayon::prelude::*;
     let (views, lights) = (arrangement.cosines().len(), arrangement.lights());
     let rows: Vec<&[u8]> = brdfs.chunks_exact(views * lights).collect();

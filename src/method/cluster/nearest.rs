@@ -32,7 +32,7 @@ pub struct Farthest {
 
 impl Farthest {
     /// Most that are kept, and so most clusters that a pass can found anew.
-    pub const MOST: usize = 64;
+    pub(crate) const MOST: usize = 64;
 
     /// Those among `texels`.
     pub fn of(texels: impl IntoIterator<Item = Near>) -> Self {

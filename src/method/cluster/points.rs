@@ -67,7 +67,7 @@ impl Arrangement {
     }
 
     /// A distance in L* units: the weighted mean absolute difference.
-    pub fn mean_lightness(&self, distance: u64) -> f64 {
+    pub(crate) fn mean_lightness(&self, distance: u64) -> f64 {
         distance as f64 / self.weight_sum().max(1) as f64 / 2.55
     }
 
@@ -80,7 +80,7 @@ impl Arrangement {
     }
 
     /// Puts together the vector of the texel at `place` in windows of all views, each [texel, light].
-    pub fn gather(&self, vector: &mut [u8], views: &[Vec<u8>], place: usize) {
+    pub(crate) fn gather(&self, vector: &mut [u8], views: &[Vec<u8>], place: usize) {
         for (&start, codes) in self.view_start.iter().zip(views) {
             let codes = &codes[place * self.lights..(place + 1) * self.lights];
             vector[start..start + self.lights].copy_from_slice(codes);
@@ -99,7 +99,7 @@ impl Arrangement {
     }
 
     /// Vectors [n, stride] from codes in the plain order [n, view, light].
-    pub fn arranged(&self, plain: &[u8]) -> Vec<u8> {
+    pub(crate) fn arranged(&self, plain: &[u8]) -> Vec<u8> {
         let brdf = self.view_start.len() * self.lights;
         let mut vectors = vec![0; plain.len() / brdf * self.stride];
         for (vector, plain) in vectors.chunks_exact_mut(self.stride).zip(plain.chunks_exact(brdf)) {

@@ -18,7 +18,7 @@ pub struct Trial {
 }
 
 /// Clusterings of the same texels by the first ones of the same seeds.
-pub struct Trials<'a> {
+pub(crate) struct Trials<'a> {
     points: &'a Points,
     method: Method,
     seed: u64,
@@ -28,19 +28,19 @@ pub struct Trials<'a> {
 
 impl<'a> Trials<'a> {
     /// None yet.
-    pub fn new(points: &'a Points, method: Method, seed: u64) -> Self {
+    pub(crate) fn new(points: &'a Points, method: Method, seed: u64) -> Self {
         Self { points, method, seed, seeds: Vec::new(), found: Vec::new() }
     }
 
     /// What was tried, by the number of clusters.
-    pub fn found(mut self) -> Vec<Trial> {
+    pub(crate) fn found(mut self) -> Vec<Trial> {
         self.found.sort_by_key(|trial| trial.clusters);
         self.found
     }
 
     /// Draws `clusters` seeds, or as many as there are distinct BRDFs: how many there are then. All clusterings by no
     /// more begin with the first of these.
-    pub fn draw(&mut self, clusters: usize, context: &Context<'_>) -> Result<usize> {
+    pub(crate) fn draw(&mut self, clusters: usize, context: &Context<'_>) -> Result<usize> {
         if self.seeds.len() < clusters {
             self.seeds = seeding::draw(self.points, clusters, self.seed, 0, self.method.kernel, context)?;
         }
@@ -48,7 +48,7 @@ impl<'a> Trials<'a> {
     }
 
     /// Clusters by `clusters` seeds, or as many as there are distinct BRDFs.
-    pub fn run(&mut self, clusters: usize, context: &Context<'_>) -> Result<Clustering> {
+    pub(crate) fn run(&mut self, clusters: usize, context: &Context<'_>) -> Result<Clustering> {
         self.draw(clusters, context)?;
         let clusters = clusters.min(self.seeds.len());
         let first = self.points.vectors_of(&self.seeds[..clusters]);
@@ -59,7 +59,12 @@ impl<'a> Trials<'a> {
 
     /// The fewest clusters, at most `most`, whose error is at most `target`: doubled until it is, then halved in
     /// between. `None` where `most` are too few.
-    pub fn fewest(&mut self, target: f64, most: usize, context: &Context<'_>) -> Result<Option<Clustering>> {
+    pub(crate) fn fewest(
+        &mut self,
+        target: f64,
+        most: usize,
+        context: &Context<'_>,
+    ) -> Result<Option<Clustering>> {
         let (mut too_few, mut enough) = (0, None::<Clustering>);
         let mut clusters = 1;
         loop {
@@ -86,7 +91,7 @@ impl<'a> Trials<'a> {
 
 /// A number of clusters that may do where `clusters` leave `error` of the `target`: the error falls as a power of the
 /// number, by what the trials tell.
-pub fn more_clusters(clusters: usize, error: f64, target: f64, trials: &[Trial]) -> usize {
+pub(crate) fn more_clusters(clusters: usize, error: f64, target: f64, trials: &[Trial]) -> usize {
     /// Of a surface in many dimensions the error falls slowly.
     const STEADIEST: f64 = 0.1;
     let slope = trials

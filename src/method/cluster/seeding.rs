@@ -39,7 +39,7 @@ struct Candidate {
 }
 
 /// How many texels `count` first centres are drawn from.
-pub fn drawn_from(count: usize) -> usize {
+pub(crate) fn drawn_from(count: usize) -> usize {
     TEXELS.max(TEXELS_OF_A_CENTRE * count)
 }
 

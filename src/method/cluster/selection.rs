@@ -10,7 +10,7 @@ use crate::random::Hash;
 use crate::shape::{Size, Window};
 
 /// Most texels of a block.
-pub const BLOCK_TEXELS: usize = 4096;
+pub(crate) const BLOCK_TEXELS: usize = 4096;
 
 /// Parts are about this many, and so are blocks of drawn chunks at least.
 const PARTS: usize = 16;
@@ -23,7 +23,7 @@ const SAMPLE: u32 = u32::MAX;
 
 /// The order in which chunks pass by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
+pub(crate) enum Order {
     /// Row by row.
     Rows,
     /// Drawn without preference by this seed.
@@ -32,7 +32,7 @@ pub enum Order {
 
 /// Texels that are read at once.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Block {
+pub(crate) struct Block {
     /// The smallest windows of the measurement that hold them, each within a row of chunks: one where chunks pass by row
     /// by row, one a chunk where they are drawn.
     pub windows: Vec<Window>,
@@ -42,7 +42,7 @@ pub struct Block {
 
 /// Texels to cluster. A slot is a texel's place in the order of reading; its number is what ties go by.
 #[derive(Clone, Debug)]
-pub struct Selection {
+pub(crate) struct Selection {
     blocks: Vec<Block>,
     /// Number of the texel of each slot.
     numbers: Vec<u32>,
@@ -53,7 +53,7 @@ pub struct Selection {
 impl Selection {
     /// The texels at these rows and columns of the measurement, numbered as they come; chunks have `chunk_side`
     /// texels a side. A texel may come more than once.
-    pub fn new(sources: &[[u32; 2]], chunk_side: usize, order: Order) -> Self {
+    pub(crate) fn new(sources: &[[u32; 2]], chunk_side: usize, order: Order) -> Self {
         let side = chunk_side as u32;
         let chunks = (BLOCK_TEXELS / (chunk_side * chunk_side)).max(1);
         let across = if order == Order::Rows { chunks as u32 } else { 1 };
@@ -98,23 +98,23 @@ impl Selection {
     }
 
     /// Number of texels.
-    pub fn texels(&self) -> usize {
+    pub(crate) fn texels(&self) -> usize {
         self.numbers.len()
     }
 
     /// The blocks, in the order of reading.
-    pub fn blocks(&self) -> &[Block] {
+    pub(crate) fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
     /// How many of the first blocks hold `texels` texels; all where there are no more.
-    pub fn first_blocks(&self, texels: usize) -> usize {
+    pub(crate) fn first_blocks(&self, texels: usize) -> usize {
         let before = self.blocks.partition_point(|block| block.slots.end < texels);
         (before + 1).min(self.blocks.len())
     }
 
     /// Runs of the first `blocks` blocks that a process assigns and sums up at once.
-    pub fn parts(&self, blocks: usize) -> Vec<Range<usize>> {
+    pub(crate) fn parts(&self, blocks: usize) -> Vec<Range<usize>> {
         let part_texels = self.slots_of(&(0..blocks)).len().div_ceil(PARTS);
         let (mut first, mut texels) = (0, 0);
         let mut parts = Vec::new();
@@ -129,32 +129,32 @@ impl Selection {
     }
 
     /// The slots of a run of blocks.
-    pub fn slots_of(&self, blocks: &Range<usize>) -> Range<usize> {
+    pub(crate) fn slots_of(&self, blocks: &Range<usize>) -> Range<usize> {
         let blocks = &self.blocks[blocks.clone()];
         let start = blocks.first().map_or(0, |block| block.slots.start);
         start..blocks.last().map_or(start, |block| block.slots.end)
     }
 
     /// Texel numbers of some slots.
-    pub fn numbers(&self, slots: Range<usize>) -> &[u32] {
+    pub(crate) fn numbers(&self, slots: Range<usize>) -> &[u32] {
         &self.numbers[slots]
     }
 
     /// Places of some slots' texels in the windows of their block.
-    pub fn places(&self, slots: Range<usize>) -> &[u32] {
+    pub(crate) fn places(&self, slots: Range<usize>) -> &[u32] {
         &self.places[slots]
     }
 
     /// `count` texels of the first `blocks` blocks drawn without preference, as ascending texel numbers; all of these
     /// where there are no more.
-    pub fn sample(&self, blocks: usize, count: usize, seed: u64) -> Vec<u32> {
+    pub(crate) fn sample(&self, blocks: usize, count: usize, seed: u64) -> Vec<u32> {
         let mut among = self.numbers[self.slots_of(&(0..blocks))].to_vec();
         among.sort_unstable();
         subset(among.len(), count, seed, SAMPLE).into_iter().map(|at| among[at as usize]).collect()
     }
 
     /// Puts what lies by slots in the order of texel numbers.
-    pub fn by_number<T: Copy + Default>(&self, by_slot: &[T]) -> Vec<T> {
+    pub(crate) fn by_number<T: Copy + Default>(&self, by_slot: &[T]) -> Vec<T> {
         let mut by_number = vec![T::default(); by_slot.len()];
         for (&number, &value) in self.numbers.iter().zip(by_slot) {
             by_number[number as usize] = value;

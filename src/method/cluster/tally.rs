@@ -27,7 +27,7 @@ pub struct Tally {
 
 impl Tally {
     /// Most texels of which sums of codes fit.
-    pub const MOST_TEXELS: usize = (u32::MAX / 255) as usize;
+    pub(crate) const MOST_TEXELS: usize = (u32::MAX / 255) as usize;
 
     /// Nothing counted yet.
     pub fn new(rule: CentreRule, clusters: usize, stride: usize) -> Self {
@@ -53,7 +53,12 @@ impl Tally {
     }
 
     /// A tally from its parts; `None` where their lengths do not fit.
-    pub fn from_parts(rule: CentreRule, stride: usize, texels: Vec<u32>, counts: Vec<u32>) -> Option<Self> {
+    pub(crate) fn from_parts(
+        rule: CentreRule,
+        stride: usize,
+        texels: Vec<u32>,
+        counts: Vec<u32>,
+    ) -> Option<Self> {
         let fits = counts.len() == texels.len() * Self::counts_of_a_cluster(rule, stride);
         fits.then_some(Self { rule, stride, texels, counts })
     }
@@ -93,14 +98,14 @@ impl Tally {
     }
 
     /// Adds another part's counts by the same centres.
-    pub fn merge(&mut self, other: &Self) {
+    pub(crate) fn merge(&mut self, other: &Self) {
         let add = |(sum, &more): (&mut u32, &u32)| *sum += more;
         self.texels.iter_mut().zip(&other.texels).for_each(add);
         self.counts.iter_mut().zip(&other.counts).for_each(add);
     }
 
     /// Clusters without a texel.
-    pub fn empty_clusters(&self) -> Vec<usize> {
+    pub(crate) fn empty_clusters(&self) -> Vec<usize> {
         (0..self.texels.len()).filter(|&cluster| self.texels[cluster] == 0).collect()
     }
 

@@ -2,7 +2,7 @@
 
 /// A bijection of 32-bit words in which every bit depends on all (constants by C. Wellons' search).
 #[inline]
-pub fn mix(mut word: u32) -> u32 {
+pub(crate) fn mix(mut word: u32) -> u32 {
     word ^= word >> 16;
     word = word.wrapping_mul(0x21f0_aaad);
     word ^= word >> 15;

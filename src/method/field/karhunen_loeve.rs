@@ -13,7 +13,7 @@ const MAX_SWEEPS: usize = 1000;
 ///
 /// # Errors
 /// When the moments have no eigenvectors, which happens to values that are not finite only.
-pub fn transform(centred: &Field) -> Result<DMatrix<f64>> {
+pub(crate) fn transform(centred: &Field) -> Result<DMatrix<f64>> {
     let moments = centred.second_moments();
     let finite = moments.iter().all(|value| value.is_finite());
     let eigen = finite.then(|| SymmetricEigen::try_new(moments, f64::EPSILON, MAX_SWEEPS)).flatten();
@@ -30,7 +30,7 @@ pub fn transform(centred: &Field) -> Result<DMatrix<f64>> {
 }
 
 /// (16): every texel multiplied by `transform`.
-pub fn project(field: &Field, transform: &DMatrix<f64>) -> Field {
+pub(crate) fn project(field: &Field, transform: &DMatrix<f64>) -> Field {
     let mut out = field.clone();
     for (to, from) in
         out.samples.chunks_exact_mut(field.channels).zip(field.samples.chunks_exact(field.channels))
@@ -43,7 +43,8 @@ pub fn project(field: &Field, transform: &DMatrix<f64>) -> Field {
 }
 
 /// (24): the inverse of [`project`]. T is orthonormal, so its inverse is its transpose.
-pub fn unproject(field: &Field, transform: &DMatrix<f64>) -> Field {
+#[cfg(test)]
+fn unproject(field: &Field, transform: &DMatrix<f64>) -> Field {
     project(field, &transform.transpose())
 }
 

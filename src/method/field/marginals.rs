@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 
 /// Values of z on each axis of the table.
-pub const NODES: usize = 129;
+pub(crate) const NODES: usize = 129;
 
 /// The table spans z from -4 to 4; values beyond are taken for its border.
 const REACH: f64 = 4.0;
@@ -100,7 +100,7 @@ impl Marginals {
     ///
     /// # Errors
     /// When the table has another size or holds what no unit normal has.
-    pub fn from_table(
+    pub(crate) fn from_table(
         matching: Matching,
         table: Vec<[f32; 2]>,
         mean: &[f64],

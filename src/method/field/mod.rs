@@ -11,7 +11,7 @@
 //! bit-identical.
 
 pub mod fit;
-pub mod karhunen_loeve;
+pub(crate) mod karhunen_loeve;
 pub mod marginals;
 pub mod model;
 pub mod pyramid;

@@ -25,7 +25,7 @@ pub fn reduce(field: &Field, boundary: Boundary) -> Field {
 ///
 /// # Errors
 /// When `field` is not the size that [`reduce`] makes of `height` x `width`.
-pub fn expand(field: &Field, height: usize, width: usize, boundary: Boundary) -> Result<Field> {
+pub(crate) fn expand(field: &Field, height: usize, width: usize, boundary: Boundary) -> Result<Field> {
     if [field.height, field.width] != [height.div_ceil(2), width.div_ceil(2)] {
         return Err(Error::internal(format!(
             "a level of {} x {} texels does not expand to {height} x {width}",
@@ -39,7 +39,7 @@ pub fn expand(field: &Field, height: usize, width: usize, boundary: Boundary) ->
 }
 
 /// Splits a field into `levels` (at least 1) bands: 0 is the finest band-pass, the last the coarsest low-pass.
-pub fn decompose(field: &Field, levels: usize, boundary: Boundary) -> Result<Vec<Field>> {
+pub(crate) fn decompose(field: &Field, levels: usize, boundary: Boundary) -> Result<Vec<Field>> {
     let mut bands = Vec::new();
     let mut fine = field.clone();
     for _ in 1..levels {
@@ -56,7 +56,8 @@ pub fn decompose(field: &Field, levels: usize, boundary: Boundary) -> Result<Vec
 ///
 /// # Errors
 /// When there is no band, or the bands do not have the sizes of one pyramid.
-pub fn collapse(bands: &[Field], boundary: Boundary) -> Result<Field> {
+#[cfg(test)]
+pub(crate) fn collapse(bands: &[Field], boundary: Boundary) -> Result<Field> {
     let (coarsest, finer) = bands.split_last().ok_or_else(|| Error::internal("a pyramid of no levels"))?;
     let mut sum = coarsest.clone();
     for band in finer.iter().rev() {

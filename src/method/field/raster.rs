@@ -64,7 +64,7 @@ impl Field {
     }
 
     /// The field less its mean, and the mean.
-    pub fn centred(&self) -> (Self, Vec<f64>) {
+    pub(crate) fn centred(&self) -> (Self, Vec<f64>) {
         let mean = self.mean();
         let mut field = self.clone();
         for texel in field.samples.chunks_exact_mut(self.channels) {
@@ -76,7 +76,7 @@ impl Field {
     }
 
     /// Second-order moments E{Y Y^T} of (14), `[channels, channels]`: the covariance when the field is centred.
-    pub fn second_moments(&self) -> DMatrix<f64> {
+    pub(crate) fn second_moments(&self) -> DMatrix<f64> {
         let mut moments = DMatrix::zeros(self.channels, self.channels);
         for texel in self.samples.chunks_exact(self.channels) {
             for (i, &a) in texel.iter().enumerate() {

@@ -82,7 +82,12 @@ impl Surface {
     ///
     /// # Errors
     /// Those of [`Synthesis::next_row`].
-    pub fn next_rows(&self, synthesis: &mut Synthesis, width: usize, normals: &mut [[f32; 3]]) -> Result<()> {
+    pub(crate) fn next_rows(
+        &self,
+        synthesis: &mut Synthesis,
+        width: usize,
+        normals: &mut [[f32; 3]],
+    ) -> Result<()> {
         let mut row = vec![0.0; width * self.field.channels()];
         for normals in normals.chunks_exact_mut(width) {
             synthesis.next_row(&mut row)?;

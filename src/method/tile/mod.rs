@@ -48,7 +48,7 @@ impl Tile {
     }
 
     /// Position of each source within [`Tile::bounds`], counted row by row.
-    pub fn offsets_in_bounds(&self) -> Vec<usize> {
+    pub(crate) fn offsets_in_bounds(&self) -> Vec<usize> {
         let Window { y, x, size } = self.bounds();
         self.source
             .iter()

@@ -6,7 +6,7 @@
 /// `cost` is laid out [step][place]. Ties go to the smaller place. Returns the place at each step
 /// and the total cost. With `closed`, the last place is also within one of the first, so that the
 /// path joins itself where a strip wraps.
-pub fn least_path(cost: &[u64], length: usize, breadth: usize, closed: bool) -> (Vec<usize>, u64) {
+pub(crate) fn least_path(cost: &[u64], length: usize, breadth: usize, closed: bool) -> (Vec<usize>, u64) {
     if !closed {
         return least_path_between(cost, length, breadth, None);
     }

@@ -33,13 +33,13 @@ impl SearchRange {
     /// Where the plane has a lattice, sides are whole numbers of cells as nearly as texels allow, of half of the
     /// greatest side and more: there is a multiple of every period up to the greatest side. Where no such sides are,
     /// the lattice is passed over. Returns `None` where the plane is too small to cut a tile with an overlap from it.
-    pub fn for_plane(size: Size, lattice: &Lattice) -> Option<Self> {
+    pub(crate) fn for_plane(size: Size, lattice: &Lattice) -> Option<Self> {
         let overlap = (size.height.min(size.width) / 8).clamp(6, 48);
         Self::with(size, lattice, overlap, [5, 8])
     }
 
     /// The same for tiles that hold nearly all of a plane: of four fifths of its sides and more, with half the overlap.
-    pub fn nearly_all(size: Size, lattice: &Lattice) -> Option<Self> {
+    pub(crate) fn nearly_all(size: Size, lattice: &Lattice) -> Option<Self> {
         let overlap = (size.height.min(size.width) / 16).clamp(4, 24);
         Self::with(size, lattice, overlap, [4, 5])
     }
@@ -63,7 +63,7 @@ impl SearchRange {
     /// # Errors
     /// The width of the overlap, where the plane does not hold as much more than the tile, or a side has less than 8
     /// texels.
-    pub fn of_size(size: Size, plane: Size) -> Result<Self, usize> {
+    pub(crate) fn of_size(size: Size, plane: Size) -> Result<Self, usize> {
         let overlap = (size.height.min(size.width) / 8).clamp(2, 48);
         let fits = size.height + overlap <= plane.height && size.width + overlap <= plane.width;
         if !fits || size.height.min(size.width) < 8 {

@@ -8,14 +8,19 @@ use btfkit_formats::Direction;
 
 /// Which measured direction pairs stand for another pair, and with what weights.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Appearance {
+pub(crate) struct Appearance {
     /// (view, light, weight); weights sum to 1, times the cosine ratio beyond the outer ring of lights.
     pub terms: Vec<(usize, usize, f64)>,
 }
 
 impl Appearance {
     /// Mixes the three views and three lights of the enclosing triangles.
-    pub fn new(views: &Interpolator, lights: &Interpolator, view: Direction, light: Direction) -> Self {
+    pub(crate) fn new(
+        views: &Interpolator,
+        lights: &Interpolator,
+        view: Direction,
+        light: Direction,
+    ) -> Self {
         let (view, light) = (views.mix(view), lights.mix(light));
         let terms = view
             .terms
@@ -26,7 +31,7 @@ impl Appearance {
     }
 
     /// Linear RGB of BRDFs laid out [brdf, view, light, channel].
-    pub fn of_brdfs(&self, brdfs: &Samples, shape: [usize; 4], decoder: &Decoder) -> Vec<[f32; 3]> {
+    pub(crate) fn of_brdfs(&self, brdfs: &Samples, shape: [usize; 4], decoder: &Decoder) -> Vec<[f32; 3]> {
         let [count, views, lights, channels] = shape;
         (0..count)
             .map(|brdf| {
@@ -43,6 +48,6 @@ impl Appearance {
 
 /// Adds a colour times `weight`.
 #[inline]
-pub fn add(sum: &mut [f64; 3], weight: f64, rgb: [f64; 3]) {
+pub(crate) fn add(sum: &mut [f64; 3], weight: f64, rgb: [f64; 3]) {
     sum.iter_mut().zip(rgb).for_each(|(sum, value)| *sum += weight * value);
 }

@@ -1,4 +1,4 @@
 //! BTF values of clusters, under any view and light.
 
-pub mod evaluate;
-pub mod triangulation;
+pub(crate) mod evaluate;
+pub(crate) mod triangulation;

@@ -15,7 +15,7 @@ const NEGLIGIBLE_WEIGHT: f64 = 1e-9;
 /// Stereographic projection from the nadir maps circles to circles, so the planar Delaunay
 /// triangulation of the projections is the spherical one. Fewer than three directions, or
 /// directions on one arc, have none.
-pub fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
+pub(crate) fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
     let points: Vec<Point> = directions
         .iter()
         .map(|direction| {
@@ -29,7 +29,7 @@ pub fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
 
 /// A weighted sum of measured directions that stands for another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mix {
+pub(crate) struct Mix {
     /// Numbers of directions and their weights, which are positive and sum to 1.
     pub terms: Vec<(usize, f64)>,
     /// cos(theta) / cos(theta of the mix) where the direction lies beyond the outer ring, else 1.
@@ -38,7 +38,7 @@ pub struct Mix {
 }
 
 /// Finds the [`Mix`] of any direction.
-pub struct Interpolator {
+pub(crate) struct Interpolator {
     vectors: Vec<[f64; 3]>,
     triangles: Vec<[usize; 3]>,
     border: Vec<[usize; 2]>,
@@ -46,7 +46,7 @@ pub struct Interpolator {
 
 impl Interpolator {
     /// For directions and their triangles (as stored with a model).
-    pub fn new(directions: &[Direction], triangles: &[[u16; 3]]) -> Self {
+    pub(crate) fn new(directions: &[Direction], triangles: &[[u16; 3]]) -> Self {
         let vectors: Vec<_> = directions.iter().map(|direction| direction.vector()).collect();
         let triangles: Vec<[usize; 3]> = triangles
             .iter()
@@ -59,7 +59,7 @@ impl Interpolator {
 
     /// The mix that stands for `direction`: barycentric within a triangle, at the border for its
     /// azimuth beyond the outer ring, else (no triangles, or none on that side) the nearest direction.
-    pub fn mix(&self, direction: Direction) -> Mix {
+    pub(crate) fn mix(&self, direction: Direction) -> Mix {
         let target = direction.vector();
         let nearest = self.nearest(target);
         let exact = |number| Mix { terms: vec![(number, 1.0)], cosine_ratio: 1.0 };
@@ -85,7 +85,7 @@ impl Interpolator {
 
     /// The direction that is shown instead of one that lies outside of all triangles; none where that one is mixed of
     /// what was measured around it.
-    pub fn shown_instead(&self, direction: Direction) -> Option<Direction> {
+    pub(crate) fn shown_instead(&self, direction: Direction) -> Option<Direction> {
         /// Nearer than this, cosine of half a degree, it is the same for the eye.
         const NEAR: f64 = 0.999_962;
         let mut shown = [0.0; 3];

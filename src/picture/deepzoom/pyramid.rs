@@ -10,7 +10,7 @@ use crate::shape::{Size, Window};
 
 /// A pyramid of tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pyramid {
+pub(crate) struct Pyramid {
     /// The picture.
     pub size: Size,
     /// Side of a tile without its overlap.
@@ -21,37 +21,37 @@ pub struct Pyramid {
 
 impl Pyramid {
     /// Number of the full-size level; there is one level more than that.
-    pub fn top(&self) -> u32 {
+    pub(crate) fn top(&self) -> u32 {
         let side = self.size.height.max(self.size.width);
         usize::BITS - side.saturating_sub(1).leading_zeros()
     }
 
     /// Size of a level.
-    pub fn level(&self, level: u32) -> Size {
+    pub(crate) fn level(&self, level: u32) -> Size {
         let halvings = self.top() - level.min(self.top());
         let halved = |side: usize| (((side - 1) >> halvings) + 1).max(1);
         Size::new(halved(self.size.height), halved(self.size.width))
     }
 
     /// Rows and columns of the tiles of a level of this size.
-    pub fn grid(&self, level: Size) -> Size {
+    pub(crate) fn grid(&self, level: Size) -> Size {
         Size::new(level.height.div_ceil(self.side), level.width.div_ceil(self.side))
     }
 
     /// Pixels of a tile.
-    pub fn tile(&self, level: Size, row: usize, column: usize) -> Window {
+    pub(crate) fn tile(&self, level: Size, row: usize, column: usize) -> Window {
         let (rows, columns) = (self.span(level.height, row), self.span(level.width, column));
         Window { y: rows.start, x: columns.start, size: Size::new(rows.len(), columns.len()) }
     }
 
     /// The pixels along one axis of tile `number`, with those that it shares.
-    pub fn span(&self, extent: usize, number: usize) -> Range<usize> {
+    pub(crate) fn span(&self, extent: usize, number: usize) -> Range<usize> {
         let start = (number * self.side).saturating_sub(self.overlap);
         start..((number + 1) * self.side + self.overlap).min(extent)
     }
 
     /// Number of tiles of all levels.
-    pub fn tiles(&self) -> u64 {
+    pub(crate) fn tiles(&self) -> u64 {
         (0..=self.top()).map(|level| self.grid(self.level(level)).texels() as u64).sum()
     }
 }

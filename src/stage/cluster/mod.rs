@@ -26,6 +26,7 @@ pub use crate::method::cluster::choice::{Amount, First};
 use crate::method::cluster::lloyd::{Limits, Method, Pass};
 use crate::method::cluster::points::Arrangement;
 use crate::method::cluster::selection::{Order, Selection};
+use crate::method::cluster::tally::Tally;
 use crate::method::tile::Tile;
 use crate::names::with_ending;
 use crate::run::Context;
@@ -231,6 +232,14 @@ pub fn plan(options: &Options) -> Result<Plan> {
             return Err(Error::usage(format!("got {number}, expected a number above 0")));
         }
     };
+    if options.centre == CentreRule::Mean && tile.size.texels() > Tally::MOST_TEXELS {
+        return Err(Error::usage(format!(
+            "means of codes are summed over at most {} texels, the tile has {}",
+            Tally::MOST_TEXELS,
+            tile.size.texels()
+        ))
+        .hint("use --centre median, or cut a tile: btf tile"));
+    }
     if most_clusters == 0 {
         let raw = description.size.texels();
         return Err(Error::usage(format!(

@@ -27,10 +27,11 @@ use crate::run::{Context, read_ahead};
 use crate::stage::image::{self, Scene, Subject};
 
 use place::PyramidFiles;
+pub use verify::Pyramidal;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
-pub const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
+pub(crate) const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
 
 /// The member of the state of a finished pyramid that tells what its tiles do not hold.
 const NOTES: &str = "notes";

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit_formats::{Limits, picture};
 use rayon::prelude::*;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::TILE_SIDES;
@@ -16,8 +16,8 @@ use crate::picture::deepzoom::{Encoding, page};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::Size;
-use crate::stage::about::{Kept, Pyramidal, bytes_below};
-use crate::stage::verify::Report;
+use crate::stage::kept::{Kept, bytes_below};
+use crate::stage::verify::report::Report;
 use crate::store::recognise::PYRAMID_FOLDER;
 use crate::zarr::checksums::DIGITS;
 use crate::zarr::metadata;
@@ -30,6 +30,30 @@ const MOST_SIDE: usize = 1 << 24;
 
 const ANEW: &str =
     "delete this file and run the command that made the pyramid again, which writes what is missing";
+
+/// What a Deep Zoom pyramid is.
+#[derive(Clone, Debug, Serialize)]
+pub struct Pyramidal {
+    /// As of a store; the bytes are those of its tiles.
+    #[serde(flatten)]
+    pub kept: Kept,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Number of levels.
+    pub levels: u32,
+    /// Number of tiles of all levels.
+    pub tiles: u64,
+    /// Side of a tile without its overlap.
+    pub tile_side: usize,
+    /// Pixels of its neighbours that a tile holds.
+    pub overlap: usize,
+    /// Format of the tiles.
+    pub tile_format: &'static str,
+    /// What it shows, and how.
+    pub recipe: Value,
+}
 
 /// The recipe of a pyramid, as far as its tiles follow from it; the seal covers all of it.
 #[derive(Deserialize)]
@@ -170,7 +194,7 @@ pub(crate) fn about(path: &Path) -> Result<Pyramidal> {
 /// Where there is none, or its recipe is damaged; and those of the operating system.
 pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
     let Opened { description, state, recipe, pyramid, place } = Opened::at(path)?;
-    let mut report = Report::of("deepzoom");
+    let mut report = Report::new("deepzoom");
     report.checked("size", pyramid.size.to_string());
     report.checked("levels", (pyramid.top() + 1).to_string());
     report.checked("tiles", pyramid.tiles().to_string());

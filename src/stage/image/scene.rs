@@ -245,7 +245,7 @@ impl Scene {
     }
 
     /// Multiplies what is shown of light.
-    pub fn expose(&mut self, exposure: f64) {
+    pub(crate) fn expose(&mut self, exposure: f64) {
         let scale = |pixels: &mut [[f32; 3]]| {
             pixels.as_flattened_mut().iter_mut().for_each(|value| *value *= exposure as f32);
         };
@@ -310,7 +310,7 @@ impl Scene {
     ///
     /// # Errors
     /// Where not even a row fits.
-    pub fn bands_in_flight(
+    pub(crate) fn bands_in_flight(
         &self,
         what: &str,
         beside: u64,

@@ -30,7 +30,7 @@ pub enum Choice {
 
 impl Choice {
     /// What `Auto` means for a plane of this size; every other choice is itself.
-    pub fn resolved(self, plane: Size) -> Self {
+    pub(crate) fn resolved(self, plane: Size) -> Self {
         match self {
             Self::Auto if plane.height.max(plane.width) <= SMALL_PLANE => Self::Largest,
             Self::Auto => Self::Cut,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Finding, OLDEST_NOTE, Report, consolidated, kept, unfinished};
+use super::report::{Finding, MOST_FINDINGS, OLDEST_NOTE, Report, consolidated, kept, unfinished};
 use crate::error::{ErrorKind, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
@@ -53,7 +53,7 @@ pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> R
     })?;
     context.progress.end();
     let intact = findings.iter().all(Vec::is_empty);
-    report.findings.extend(findings.into_iter().flatten().take(super::MOST_FINDINGS));
+    report.findings.extend(findings.into_iter().flatten().take(MOST_FINDINGS));
     if enlarged.format() == OLDEST_FORMAT {
         report.notes.push(OLDEST_NOTE.to_owned());
     } else if !enlarged.is_finished()? {

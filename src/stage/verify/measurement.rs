@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::Serialize;
 
-use super::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
+use super::report::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
 use crate::archive::Source;
 use crate::color::Remarkable;
 use crate::error::{Error, ErrorKind, Result};

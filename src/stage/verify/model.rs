@@ -1,6 +1,6 @@
 //! A model: each stage that is done, its arrays against their ranges and against what they follow from.
 
-use super::{OLDEST_NOTE, Report, consolidated};
+use super::report::{OLDEST_NOTE, Report, consolidated};
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;

@@ -24,10 +24,10 @@ use facts::{Facts, MOST_CLUSTERS};
 pub const KIND: &str = "enlarged";
 
 /// Side of a shard in texels: what is written at once.
-pub const SHARD_SIDE: usize = 512;
+pub(crate) const SHARD_SIDE: usize = 512;
 
 /// Side of a chunk in texels.
-pub const CHUNK_SIDE: usize = 128;
+pub(crate) const CHUNK_SIDE: usize = 128;
 
 /// The attribute of a finished index that holds the checksums of its shards.
 const CHECKSUMS: &str = "checksums";
@@ -165,7 +165,7 @@ impl Enlarged {
     ///
     /// # Errors
     /// Those of reading the attributes.
-    pub fn is_finished(&self) -> Result<bool> {
+    pub(crate) fn is_finished(&self) -> Result<bool> {
         Ok(self.attributes()?.contains_key(CHECKSUMS))
     }
 
@@ -173,7 +173,7 @@ impl Enlarged {
     ///
     /// # Errors
     /// Those of reading.
-    pub fn is_consolidated(&self) -> Result<bool> {
+    pub(crate) fn is_consolidated(&self) -> Result<bool> {
         let names: Vec<String> = self.arrays().map(|array| array.name().to_owned()).collect();
         self.store.is_consolidated(&names)
     }
@@ -223,7 +223,7 @@ impl Enlarged {
     }
 
     /// Name of the model that it was enlarged from.
-    pub fn model_name(&self) -> Option<&str> {
+    pub(crate) fn model_name(&self) -> Option<&str> {
         self.facts.model_name.as_deref()
     }
 
@@ -248,12 +248,12 @@ impl Enlarged {
     }
 
     /// Whether normals were kept.
-    pub fn has_normals(&self) -> bool {
+    pub(crate) fn has_normals(&self) -> bool {
         self.normals.is_some()
     }
 
     /// Whether the source of each texel was kept.
-    pub fn has_source(&self) -> bool {
+    pub(crate) fn has_source(&self) -> bool {
         self.source.is_some()
     }
 
@@ -263,7 +263,7 @@ impl Enlarged {
     }
 
     /// Whether a shard has been written, and was not cut off since.
-    pub fn has_shard(&self, shard_row: usize, shard_column: usize) -> bool {
+    pub(crate) fn has_shard(&self, shard_row: usize, shard_column: usize) -> bool {
         let place = [shard_row as u64, shard_column as u64];
         let has = |array: &Option<Array>, place: &[u64]| {
             array.as_ref().is_none_or(|array| self.store.has_shard(array, place))
@@ -275,7 +275,7 @@ impl Enlarged {
 
     /// Rows and columns of the shards of the index that lie on the disk, in order: whatever size is claimed, no others
     /// are looked for.
-    pub fn shards_found(&self) -> Vec<[usize; 2]> {
+    pub(crate) fn shards_found(&self) -> Vec<[usize; 2]> {
         let Size { height, width } = self.shards();
         let listed = |folder: &Path, end: usize| -> Vec<usize> {
             let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();

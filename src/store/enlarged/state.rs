@@ -23,7 +23,7 @@ const DIGEST_LENGTH: usize = 64;
 
 /// How far an enlargement is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EnlargeState {
+pub(crate) struct EnlargeState {
     /// Rows of shards that are written.
     pub shard_rows: usize,
     /// State of the field after their rows.
@@ -39,7 +39,7 @@ impl EnlargeState {
     ///
     /// # Errors
     /// [`crate::ErrorKind::Recipe`] where it is another recipe's; when the file is damaged.
-    pub fn read(output: &Path, digest: &str) -> Result<Option<Self>> {
+    pub(crate) fn read(output: &Path, digest: &str) -> Result<Option<Self>> {
         let file = place(output);
         match MappedFile::open(&file) {
             Ok(bytes) => Self::parse(bytes.as_ref(), &file, digest).map(Some),
@@ -52,12 +52,12 @@ impl EnlargeState {
     }
 
     /// Replaces what is there at once.
-    pub fn write(&self, output: &Path, digest: &str) -> Result<()> {
+    pub(crate) fn write(&self, output: &Path, digest: &str) -> Result<()> {
         temporary::write_file(&place(output), &self.to_bytes(digest))
     }
 
     /// Removes it: the output is finished.
-    pub fn remove(output: &Path) -> Result<()> {
+    pub(crate) fn remove(output: &Path) -> Result<()> {
         let file = place(output);
         match std::fs::remove_file(&file) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

@@ -48,12 +48,12 @@ impl Description {
     }
 
     /// Bytes of a texel under one view.
-    pub fn texel_bytes(&self) -> usize {
+    pub(crate) fn texel_bytes(&self) -> usize {
         self.texel_samples() * self.sample_type.bytes()
     }
 
     /// Side of a chunk in texels.
-    pub fn chunk_side(&self) -> usize {
+    pub(crate) fn chunk_side(&self) -> usize {
         CHUNK_SIDE
     }
 
@@ -72,7 +72,7 @@ impl Description {
     }
 
     /// Bytes of one view's samples.
-    pub fn view_bytes(&self) -> u64 {
+    pub(crate) fn view_bytes(&self) -> u64 {
         self.size.texels() as u64 * self.texel_bytes() as u64
     }
 

@@ -49,7 +49,7 @@ impl Images {
 
     /// Samples of a window, [y, x, light, channel]. Beyond the plane its last row and column go on: such samples
     /// are never read, and so they cost least.
-    pub fn gather(&self, window: Window) -> Samples {
+    pub(crate) fn gather(&self, window: Window) -> Samples {
         macro_rules! gathered {
             ($variant:ident, $type:ty) => {{
                 let images = self.groups.iter().map(|(lights, samples)| match samples {
@@ -122,7 +122,7 @@ fn scatter<T: Copy>(from: &[T], to: &mut [T], channels: usize, stride: usize) {
 }
 
 /// Texels [y, x, light, channel] as images [light, y, x, channel].
-pub fn images_of_texels(texels: &Samples, lights: usize, channels: usize) -> Samples {
+pub(crate) fn images_of_texels(texels: &Samples, lights: usize, channels: usize) -> Samples {
     fn turned<T: Copy>(texels: &[T], lights: usize, channels: usize) -> Vec<T> {
         let texel = lights * channels;
         (0..lights)
@@ -141,7 +141,7 @@ pub fn images_of_texels(texels: &Samples, lights: usize, channels: usize) -> Sam
 }
 
 /// The bytes of samples, little-endian.
-pub fn bytes(samples: &Samples) -> &[u8] {
+pub(crate) fn bytes(samples: &Samples) -> &[u8] {
     const { assert!(cfg!(target_endian = "little")) };
     match samples {
         Samples::U8(list) => list,

@@ -11,7 +11,7 @@
 
 mod description;
 mod facts;
-pub mod gather;
+pub(crate) mod gather;
 mod read;
 mod write;
 
@@ -195,7 +195,7 @@ impl Measurement {
     ///
     /// # Errors
     /// Those of reading the attributes.
-    pub fn is_finished(&self) -> Result<bool> {
+    pub(crate) fn is_finished(&self) -> Result<bool> {
         Ok(self.store.expect(KIND)?.contains_key(CHECKSUMS))
     }
 
@@ -223,7 +223,7 @@ impl Measurement {
     ///
     /// # Errors
     /// Where they are not.
-    pub fn check_coordinates(&self) -> Result<()> {
+    pub(crate) fn check_coordinates(&self) -> Result<()> {
         directions::check_coordinates(&self.store, "view", &self.description.views)?;
         directions::check_coordinates(&self.store, "light", &self.description.lights)
     }
@@ -232,7 +232,7 @@ impl Measurement {
     ///
     /// # Errors
     /// Those of reading.
-    pub fn is_consolidated(&self) -> Result<bool> {
+    pub(crate) fn is_consolidated(&self) -> Result<bool> {
         self.store.is_consolidated(&self.arrays())
     }
 
@@ -285,7 +285,7 @@ impl Measurement {
     }
 
     /// Whether all of a view has been written.
-    pub fn has_view(&self, view: usize) -> bool {
+    pub(crate) fn has_view(&self, view: usize) -> bool {
         self.shards().all(|(sy, sx)| {
             self.store.has_chunk(&self.reflectance, &[view as u64, sy, sx, 0, 0])
                 && self.store.has_chunk(&self.luminance, &[view as u64, sy, sx, 0])
@@ -298,12 +298,12 @@ impl Measurement {
     }
 
     /// The texels of each chunk, cut at the border of the plane.
-    pub fn chunk_windows(&self) -> impl Iterator<Item = Window> + use<> {
+    pub(crate) fn chunk_windows(&self) -> impl Iterator<Item = Window> + use<> {
         self.windows(CHUNK_SIDE)
     }
 
     /// The texels of each row of chunks.
-    pub fn chunk_row_windows(&self) -> impl Iterator<Item = Window> + use<> {
+    pub(crate) fn chunk_row_windows(&self) -> impl Iterator<Item = Window> + use<> {
         self.windows(self.description.size.width)
     }
 

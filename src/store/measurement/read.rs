@@ -50,7 +50,7 @@ impl Measurement {
     ///
     /// # Errors
     /// As [`Measurement::read_reflectance`].
-    pub fn read_luminance_of(&self, view: usize, windows: &[Window]) -> Result<Vec<u8>> {
+    pub(crate) fn read_luminance_of(&self, view: usize, windows: &[Window]) -> Result<Vec<u8>> {
         self.read_windows(SampleArray::Luminance, self.description.code_chunk(), view, windows)
     }
 

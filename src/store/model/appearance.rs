@@ -20,7 +20,7 @@ use crate::zarr::{Layout, Store};
 /// What an appearance depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct AppearanceRecipe {
+pub(crate) struct AppearanceRecipe {
     /// Digest of the clusters.
     pub cluster: String,
     /// The lattice that was asked for, as on the command line.
@@ -119,7 +119,7 @@ fn offset_layout(dims: usize) -> Layout<'static> {
 
 impl Model {
     /// Writes how the exemplar looks.
-    pub fn write_appearance(&self, appearance: &Appearance) -> Result<()> {
+    pub(crate) fn write_appearance(&self, appearance: &Appearance) -> Result<()> {
         write(&self.store, appearance)
     }
 

@@ -89,7 +89,7 @@ const CLUSTER_METHOD: u64 = 2;
 /// What clusters depend on that were found in this model's tile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ClusterRecipe {
+pub(crate) struct ClusterRecipe {
     /// Digest of the tile.
     pub tile: String,
     /// How many clusters.
@@ -117,7 +117,7 @@ impl Recipe for ClusterRecipe {
 /// What clusters depend on that were taken from another model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TakenRecipe {
+pub(crate) struct TakenRecipe {
     /// Digest of the tile.
     pub tile: String,
     /// Digest of the other model's clusters.
@@ -201,7 +201,7 @@ pub(super) fn arrays(
 
 impl Model {
     /// Writes what clusters are.
-    pub fn write_clusters(&self, clusters: &Clusters) -> Result<()> {
+    pub(crate) fn write_clusters(&self, clusters: &Clusters) -> Result<()> {
         let count = clusters.sources.len();
         let layout = index_layout(clusters.size, count);
         if count <= NARROW {
@@ -303,14 +303,14 @@ impl Model {
     }
 
     /// Ranges of clusters whose representatives are decoded together: at most 16 MiB, unless one is larger.
-    pub fn representative_chunks(&self) -> Result<Vec<Range<usize>>> {
+    pub(crate) fn representative_chunks(&self) -> Result<Vec<Range<usize>>> {
         let clusters = self.clusters()?;
         let rows = self.representatives_layout()?.chunk[0] as usize;
         Ok((0..clusters).step_by(rows).map(|first| first..clusters.min(first + rows)).collect())
     }
 
     /// The measured colour BRDFs that stand for some of the clusters.
-    pub fn representatives_of(&self, clusters: Range<usize>) -> Result<Representatives> {
+    pub(crate) fn representatives_of(&self, clusters: Range<usize>) -> Result<Representatives> {
         let layout = self.representatives_layout()?;
         let array = self.open_array(Stage::Cluster, "representatives", &layout)?;
         let [_, views, lights, channels] = layout.shape[..] else {
@@ -323,7 +323,7 @@ impl Model {
     }
 
     /// Row and column in the measurement of each representative.
-    pub fn representative_texels(&self) -> Result<Vec<[u32; 2]>> {
+    pub(crate) fn representative_texels(&self) -> Result<Vec<[u32; 2]>> {
         let layout = texel_layout(self.clusters()?);
         let sources = self.read::<u32>(Stage::Cluster, "representative_texel", &layout)?;
         let sources: Vec<[u32; 2]> = sources.chunks_exact(2).map(|c| [c[0], c[1]]).collect();

@@ -127,7 +127,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Model::recipe`].
-    pub fn input_digest(&self, stage: Stage) -> Result<Option<String>> {
+    pub(crate) fn input_digest(&self, stage: Stage) -> Result<Option<String>> {
         Ok(match stage {
             Stage::Tile => {
                 self.recipe::<TileRecipe>(stage)?;
@@ -144,7 +144,7 @@ impl Model {
     }
 
     /// Digest of a stage that must be done.
-    pub fn stage_digest(&self, stage: Stage) -> Result<String> {
+    pub(crate) fn stage_digest(&self, stage: Stage) -> Result<String> {
         Ok(self.done(stage)?.digest)
     }
 
@@ -233,7 +233,7 @@ impl Model {
     }
 
     /// Whether the arrays of a stage that is done are all there.
-    pub fn has_arrays(&self, stage: Stage) -> Result<bool> {
+    pub(crate) fn has_arrays(&self, stage: Stage) -> Result<bool> {
         let report = self.done(stage)?.report;
         // Arrays that do not even have their metadata are not there.
         let Ok(arrays) = self.arrays(stage, &report) else { return Ok(false) };
@@ -286,7 +286,7 @@ impl Model {
     ///
     /// # Errors
     /// Those of reading.
-    pub fn is_consolidated(&self) -> Result<bool> {
+    pub(crate) fn is_consolidated(&self) -> Result<bool> {
         let mut names = Vec::new();
         for (stage, entry) in self.entries()? {
             names.extend(self.arrays(stage, &entry.report)?.into_iter().map(|(name, _)| name));

@@ -32,7 +32,7 @@ const MOST_LEVELS: usize = 32;
 /// What a fit depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FitRecipe {
+pub(crate) struct FitRecipe {
     /// Digest of the normals.
     pub normals: String,
     /// `3d` or `2d`.
@@ -212,7 +212,7 @@ fn neighbourhood_layout(sites: usize) -> Layout<'static> {
 
 impl Model {
     /// Writes the random field model under `mrf/`.
-    pub fn write_surface(&self, surface: &Surface) -> Result<()> {
+    pub(crate) fn write_surface(&self, surface: &Surface) -> Result<()> {
         write(&self.store, surface)
     }
 

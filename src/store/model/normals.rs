@@ -14,7 +14,7 @@ pub(crate) const UNIT_TOLERANCE: f32 = 1e-4;
 /// What a normal map depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NormalsRecipe {
+pub(crate) struct NormalsRecipe {
     /// Digest of the tile.
     pub tile: String,
     /// Whether the darkest and the brightest lights of a texel were left out.
@@ -40,7 +40,7 @@ pub struct NormalsReport {
 
 impl Model {
     /// Writes the normal map [y, x, 3], unit vectors.
-    pub fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
+    pub(crate) fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
         self.store.write("normals", &normals_layout(size), normals.as_flattened())
     }
 

@@ -22,7 +22,7 @@ const MOST_SIDE: usize = 1 << 24;
 /// What a tile depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TileRecipe {
+pub(crate) struct TileRecipe {
     /// Digest of the measurement.
     pub measurement: String,
     /// What was asked for, as on the command line.
@@ -134,14 +134,14 @@ impl Model {
     ///
     /// # Errors
     /// Where there is no tile yet, or its parts do not fit together.
-    pub fn tile_report(&self) -> Result<TileReport> {
+    pub(crate) fn tile_report(&self) -> Result<TileReport> {
         let report: TileReport = self.report(Stage::Tile)?;
         report.check(&self.recipe(Stage::Tile)?).map_err(|what| self.damaged_report(Stage::Tile, &what))?;
         Ok(report)
     }
 
     /// Writes the directions of the measurement and their triangulations.
-    pub fn write_directions(&self, description: &Description) -> Result<()> {
+    pub(crate) fn write_directions(&self, description: &Description) -> Result<()> {
         for (dimension, directions) in [("view", &description.views), ("light", &description.lights)] {
             directions::write(&self.store, dimension, directions)?;
             let triangles = triangulate(directions);
@@ -161,7 +161,7 @@ impl Model {
     ///
     /// # Errors
     /// Where they are not.
-    pub fn check_coordinates(&self) -> Result<()> {
+    pub(crate) fn check_coordinates(&self) -> Result<()> {
         for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
             directions::check_coordinates(&self.store, dimension, &directions)?;
         }
@@ -188,7 +188,7 @@ impl Model {
     }
 
     /// Writes which measured texel each tile texel is, [y, x, 2].
-    pub fn write_tile(&self, tile: &Tile) -> Result<()> {
+    pub(crate) fn write_tile(&self, tile: &Tile) -> Result<()> {
         let coordinates: Vec<u32> = tile.source.iter().flatten().copied().collect();
         self.store.write("tile_source", &tile_layout(tile.size), &coordinates)
     }

@@ -5,7 +5,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 
 use super::SIGNATURE;
-use crate::picture::{aspect, orientation, profile};
+use crate::picture::{aspect, exif, orientation, profile};
 use crate::reader::Reader;
 
 /// Longest profile or text that is inflated, bytes.
@@ -122,8 +122,8 @@ impl Said {
     }
 
     fn hear_exif(&mut self, block: &[u8]) {
-        self.turn(orientation::of_exif(block));
-        self.exif_colours = self.exif_colours.take().or_else(|| profile::of_exif(block));
+        self.turn(exif::orientation(block));
+        self.exif_colours = self.exif_colours.take().or_else(|| exif::colours(block));
     }
 
     fn hear_xmp(&mut self, packet: &[u8]) {
@@ -170,9 +170,9 @@ impl Said {
                 self.icc.get_or_insert_with(|| profile::of_icc(&bytes));
             }
             Some(b"xmp") => self.hear_xmp(&bytes),
-            _ => match bytes.strip_prefix(orientation::EXIF) {
+            _ => match bytes.strip_prefix(exif::MARK) {
                 Some(block) => self.hear_exif(block),
-                None => self.turn(orientation::of_segment(&bytes)),
+                None => self.turn(exif::orientation_of_segment(&bytes)),
             },
         }
     }

@@ -51,6 +51,12 @@ fn levels(directory: &Directory<'_>, most: Option<f64>) -> Vec<String> {
     if let Some(levels) = of(tag::WHITE_LEVEL).filter(|list| !full(list)) {
         say("the white level", &levels);
     }
+    // Most writers state the largest sample that there is; all ones in binary are the range of a sensor of fewer bits.
+    let fewer_bits =
+        |&value: &f64| (15.0..most.unwrap_or(0.0)).contains(&value) && (value + 1.0).log2().fract() == 0.0;
+    if let Some(levels) = of(tag::MAX_SAMPLE_VALUE).filter(|list| list.iter().any(fewer_bits)) {
+        say("the largest sample value", &levels);
+    }
     if of(tag::LINEARIZATION_TABLE).is_some() {
         said.push("a linearization table".to_owned());
     }

@@ -1,7 +1,7 @@
 //! What the samples of a TIFF are and where they lie in the file.
 
 use super::directory::{Directory, tag};
-use super::{colours, exif_colour_space, remarks, stack};
+use super::{colours, exif, remarks};
 use crate::picture::size::{Size, unsupported};
 use crate::picture::{grey_or_rgb, orientation};
 use crate::words::counted;
@@ -93,14 +93,13 @@ enum Chunks {
 }
 
 impl Layout {
-    pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Layout> {
-        let directory = Directory::read(bytes)?;
+    pub(super) fn read(directory: &Directory<'_>, bytes: &[u8], limits: &Limits) -> Result<Layout> {
         let at = directory.at;
         let of = |found: String, expected: &'static str| Err(unsupported(found, expected).at(at));
 
         let dimensions = (directory.number(tag::WIDTH, None)?, directory.number(tag::HEIGHT, None)?);
         let stored = directory.number(tag::SAMPLES_PER_PIXEL, Some(1))?;
-        let sample_type = sample_type(&directory)?;
+        let sample_type = sample_type(directory)?;
         let size = Size::within(dimensions, stored, sample_type, at, limits)?;
 
         let number = directory.number(tag::COMPRESSION, Some(1))?;
@@ -121,7 +120,7 @@ impl Layout {
         if directory.number(tag::FILL_ORDER, Some(1))? != 1 {
             return of("fill order 2".to_owned(), "1");
         }
-        let orientation = match stated_orientation(&directory, bytes)? {
+        let orientation = match stated_orientation(directory, bytes)? {
             0 => 1,
             stated => match u8::try_from(stated) {
                 Ok(stated @ 1..=8) => stated,
@@ -133,8 +132,8 @@ impl Layout {
             2 => stored > 1,
             other => return Err(Error::malformed(format!("planar configuration {other}"), "1 or 2").at(at)),
         };
-        let (rgb, alpha) = interpretation(&directory, stored)?;
-        let (chunks, places) = places(&directory)?;
+        let (rgb, alpha) = interpretation(directory, stored)?;
+        let (chunks, places) = places(directory)?;
         if let Chunks::Tiles { width, height } = chunks {
             // A tile is unpacked whole, whatever part of it lies in the picture.
             Size::within((width, height), stored, sample_type, at, limits)?;
@@ -145,7 +144,7 @@ impl Layout {
             SampleType::U16 => Some(65535.0),
             SampleType::F16 | SampleType::F32 => None,
         };
-        let layout = Layout {
+        Ok(Layout {
             size,
             sample_type,
             alpha,
@@ -154,14 +153,12 @@ impl Layout {
             compression,
             predictor,
             orientation,
-            profile: colours::said(&directory, exif_colour_space(bytes).ok().flatten(), most),
-            remarks: remarks::of(&directory, dimensions),
+            profile: colours::said(directory, exif::colour_space(bytes).ok().flatten(), most),
+            remarks: remarks::of(directory, dimensions),
             rgb,
             chunks,
             places,
-        };
-        stack::require_single(&directory, &layout, bytes.len())?;
-        Ok(layout)
+        })
     }
 
     /// Names of the channels but alpha.
@@ -248,8 +245,7 @@ impl Layout {
                 );
             }
         }
-        self.require_apart()?;
-        stack::require_short_strips(self)
+        self.require_apart()
     }
 
     fn require_apart(&self) -> Result<()> {

@@ -30,7 +30,7 @@ pub struct Prior {
 impl Prior {
     /// The weak prior for a model of `channels` joint channels on data of the given mean variance: as much as a
     /// hundredth of one sample says, beta(0) = 2, nu_0 = channels + 2 (the least whole number with a mean).
-    pub fn weak(mean_variance: f64, channels: usize) -> Self {
+    pub(crate) fn weak(mean_variance: f64, channels: usize) -> Self {
         let k = 0.01 * mean_variance.max(LEAST_VARIANCE);
         Self { xx: k, yy: k, beta: 2.0, degrees: channels as f64 + 2.0 }
     }
@@ -38,7 +38,7 @@ impl Prior {
 
 /// The texels r whose Y_r and X_r count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Positions {
+pub(crate) enum Positions {
     /// All of them; neighbours beyond the border are found by wrapping.
     Periodic,
     /// Those at least `rows` below the top and `columns` from the left and right border.
@@ -52,7 +52,7 @@ pub enum Positions {
 
 impl Positions {
     /// All positions of a periodic field; otherwise those where every site lies inside.
-    pub fn new(boundary: Boundary, sites: &[[i32; 2]]) -> Self {
+    pub(crate) fn new(boundary: Boundary, sites: &[[i32; 2]]) -> Self {
         match boundary {
             Boundary::Periodic => Self::Periodic,
             Boundary::Mirrored => {
@@ -63,7 +63,7 @@ impl Positions {
     }
 
     /// How many positions a field of this size has.
-    pub fn count(&self, height: usize, width: usize) -> usize {
+    pub(crate) fn count(&self, height: usize, width: usize) -> usize {
         match *self {
             Self::Periodic => height * width,
             Self::Interior { rows, columns } => {
@@ -75,7 +75,7 @@ impl Positions {
 
 /// The sums of (8) over the positions of a field.
 #[derive(Clone, Debug)]
-pub struct Moments {
+pub(crate) struct Moments {
     /// How many positions were summed.
     pub count: usize,
     /// V_XX, `[channels * sites, channels * sites]`.
@@ -91,7 +91,7 @@ impl Moments {
     ///
     /// # Errors
     /// When the positions leave out less of the border than the sites reach over.
-    pub fn accumulate(field: &Field, sites: &[[i32; 2]], positions: Positions) -> Result<Self> {
+    pub(crate) fn accumulate(field: &Field, sites: &[[i32; 2]], positions: Positions) -> Result<Self> {
         let (top, side) = match positions {
             Positions::Periodic => (0, 0),
             Positions::Interior { rows, columns } => {
@@ -136,7 +136,7 @@ impl Moments {
 
     /// The sums for the first `sites` sites only, over the same positions.
     #[must_use]
-    pub fn leading(&self, sites: usize) -> Self {
+    pub(crate) fn leading(&self, sites: usize) -> Self {
         let channels = self.yy.nrows();
         let order = sites * channels;
         Self {
@@ -148,7 +148,7 @@ impl Moments {
     }
 
     /// Noise covariance that belongs to any `gamma`, not only to the estimate of (10): residual sums over beta(r).
-    pub fn residual_covariance(&self, gamma: &DMatrix<f64>, prior: &Prior) -> DMatrix<f64> {
+    pub(crate) fn residual_covariance(&self, gamma: &DMatrix<f64>, prior: &Prior) -> DMatrix<f64> {
         let mut xx = self.xx.clone();
         let mut residual = self.yy.clone();
         add_to_diagonal(&mut xx, prior.xx);
@@ -163,7 +163,7 @@ impl Moments {
 
 /// Estimates of (10) to (13), respectively (20) to (23), and what the evidence needs.
 #[derive(Clone, Debug)]
-pub struct Posterior {
+pub(crate) struct Posterior {
     /// Gamma of (10), `[channels, channels * sites]`.
     pub gamma: DMatrix<f64>,
     /// lambda of (12), `[channels, channels]`.
@@ -179,7 +179,7 @@ impl Posterior {
     ///
     /// # Errors
     /// When V_XX is not positive definite, which happens to values that are not finite only.
-    pub fn new(moments: &Moments, prior: &Prior) -> Result<Self> {
+    pub(crate) fn new(moments: &Moments, prior: &Prior) -> Result<Self> {
         let mut xx = moments.xx.clone();
         let mut yy = moments.yy.clone();
         add_to_diagonal(&mut xx, prior.xx);
@@ -191,7 +191,7 @@ impl Posterior {
     }
 
     /// Noise covariance Sigma of (11), `[channels, channels]`; beta(r) = beta(0) + r - 1 after r - 1 samples.
-    pub fn sigma(&self) -> DMatrix<f64> {
+    pub(crate) fn sigma(&self) -> DMatrix<f64> {
         &self.lambda / (self.prior.beta + self.count as f64)
     }
 
@@ -200,7 +200,7 @@ impl Posterior {
     ///
     /// # Errors
     /// When lambda is not positive definite, which happens to values that are not finite only.
-    pub fn log_evidence(&self) -> Result<f64> {
+    pub(crate) fn log_evidence(&self) -> Result<f64> {
         let channels = self.lambda.nrows();
         let c = channels as f64;
         let order = self.gamma.ncols() as f64;

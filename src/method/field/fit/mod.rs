@@ -7,10 +7,11 @@ mod choice;
 mod gain;
 mod level;
 pub mod neighbourhood;
-pub mod recursion;
-pub mod second_order;
+#[cfg(test)]
+mod recursion;
+pub(crate) mod second_order;
 mod spectrum;
-pub mod stability;
+pub(crate) mod stability;
 
 use super::karhunen_loeve;
 use super::model::{CarKind, Model, Options};

@@ -6,7 +6,7 @@ const MAX_RADIUS_SQUARED: i32 = 25;
 /// Sites s = (dy, dx) of Y_{r-s} in the half plane known before r: rows above (dy > 0, any dx) and texels to the left
 /// in the same row (dy = 0, dx > 0). Each set begins with the one before it; a set holds whole rings of equal
 /// distance, so it favours no direction. Sizes 2, 4, 6, 10, 12, 14, 18, ... 40.
-pub fn nested() -> Vec<Vec<[i32; 2]>> {
+pub(crate) fn nested() -> Vec<Vec<[i32; 2]>> {
     let mut sites = half_plane();
     sites.sort_by_key(|&[dy, dx]| (dy * dy + dx * dx, dy, dx));
     let mut sets = Vec::new();
@@ -20,12 +20,12 @@ pub fn nested() -> Vec<Vec<[i32; 2]>> {
 }
 
 /// Whether a site lies in the half plane that is known before its texel.
-pub fn is_causal([dy, dx]: [i32; 2]) -> bool {
+pub(crate) fn is_causal([dy, dx]: [i32; 2]) -> bool {
     dy > 0 || (dy == 0 && dx > 0)
 }
 
 /// The farthest row above and the farthest column to either side that the sites reach.
-pub fn reach(sites: &[[i32; 2]]) -> [usize; 2] {
+pub(crate) fn reach(sites: &[[i32; 2]]) -> [usize; 2] {
     let farthest = |axis: usize| sites.iter().map(|s| s[axis].unsigned_abs() as usize).max().unwrap_or(0);
     [farthest(0), farthest(1)]
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 
 /// Running estimates after any number of samples. Equal to the batch estimate of the same samples up to rounding.
 #[derive(Clone, Debug)]
-pub struct Recursion {
+pub(crate) struct Recursion {
     prior: Prior,
     count: usize,
     gamma: DMatrix<f64>,
@@ -18,7 +18,7 @@ pub struct Recursion {
 
 impl Recursion {
     /// The state before the first sample: Gamma = 0, lambda = V_YY(0).
-    pub fn new(channels: usize, sites: usize, prior: &Prior) -> Self {
+    pub(super) fn new(channels: usize, sites: usize, prior: &Prior) -> Self {
         let order = channels * sites;
         Self {
             prior: *prior,
@@ -33,7 +33,7 @@ impl Recursion {
     ///
     /// # Errors
     /// When the lengths are not those of the model.
-    pub fn update(&mut self, y: &[f64], x: &[f64]) -> Result<()> {
+    pub(super) fn update(&mut self, y: &[f64], x: &[f64]) -> Result<()> {
         if [y.len(), x.len()] != [self.gamma.nrows(), self.gamma.ncols()] {
             return Err(Error::internal(format!(
                 "a sample of {} and {} values for a model of {} and {}",
@@ -55,17 +55,17 @@ impl Recursion {
     }
 
     /// Gamma of (10), `[channels, channels * sites]`.
-    pub fn gamma(&self) -> &DMatrix<f64> {
+    pub(super) fn gamma(&self) -> &DMatrix<f64> {
         &self.gamma
     }
 
     /// lambda of (12), `[channels, channels]`.
-    pub fn lambda(&self) -> &DMatrix<f64> {
+    pub(crate) fn lambda(&self) -> &DMatrix<f64> {
         &self.lambda
     }
 
     /// Sigma of (11), `[channels, channels]`.
-    pub fn sigma(&self) -> DMatrix<f64> {
+    pub(super) fn sigma(&self) -> DMatrix<f64> {
         &self.lambda / (self.prior.beta + self.count as f64)
     }
 

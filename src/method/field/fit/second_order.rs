@@ -42,7 +42,7 @@ pub struct Autocovariance {
 
 impl Autocovariance {
     /// Over all pairs of texels of a wrapping field, or over the pairs that lie inside.
-    pub fn of_field(centred: &Field, boundary: Boundary, lags: Lags) -> Self {
+    pub(crate) fn of_field(centred: &Field, boundary: Boundary, lags: Lags) -> Self {
         let all: Vec<[isize; 2]> = lags.all().collect();
         Self { lags, at: all.into_par_iter().map(|lag| at_lag(centred, boundary, lag)).collect() }
     }
@@ -98,7 +98,7 @@ fn at_lag(field: &Field, boundary: Boundary, [dy, dx]: [isize; 2]) -> DMatrix<f6
 }
 
 /// Variance of every channel of a band.
-pub fn variances(band: &Field) -> Vec<f64> {
+pub(crate) fn variances(band: &Field) -> Vec<f64> {
     band.centred().0.second_moments().diagonal().iter().copied().collect()
 }
 

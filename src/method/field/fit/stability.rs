@@ -21,7 +21,7 @@ const SQUARINGS: usize = 16;
 /// A field counts as stable below this radius: a disturbance is down to a fiftieth after 977 texels. Closer to 1 margins
 /// would be longer, the grids of frequencies here and in `spectrum` might miss a peak, and no tile is large enough for
 /// such a field to be estimated from.
-pub const STABLE_RADIUS: f64 = 0.996;
+pub(crate) const STABLE_RADIUS: f64 = 0.996;
 
 type Matrix = DMatrix<Complex<f64>>;
 
@@ -32,7 +32,7 @@ type Matrix = DMatrix<Complex<f64>>;
 ///
 /// # Errors
 /// When the shape of `gamma` does not fit the sites, or a site is not causal.
-pub fn radius(gamma: &DMatrix<f64>, sites: &[[i32; 2]]) -> Result<f64> {
+pub(crate) fn radius(gamma: &DMatrix<f64>, sites: &[[i32; 2]]) -> Result<f64> {
     let channels = gamma.nrows();
     if gamma.ncols() != channels * sites.len() {
         return Err(Error::input(format!(

@@ -23,7 +23,7 @@ use extent::Offset;
 use torus::Lattice;
 
 /// Domain of the noise of level 0; level k has this plus k.
-pub const LEVEL_DOMAIN: u32 = 0x4341_5200;
+pub(crate) const LEVEL_DOMAIN: u32 = 0x4341_5200;
 
 /// A field that is being synthesised from the top row down.
 ///
@@ -167,7 +167,7 @@ impl Synthesis {
     /// # Errors
     /// When the state has another length, a position beyond the height, or values that are not finite. The synthesis is
     /// then as it was.
-    pub fn restore(&mut self, state: &[u8]) -> Result<()> {
+    pub(crate) fn restore(&mut self, state: &[u8]) -> Result<()> {
         let expected =
             size_of::<u64>() + self.levels.iter().map(Stage::state_len).sum::<usize>() * size_of::<f32>();
         let (position, values) = match state.split_first_chunk() {

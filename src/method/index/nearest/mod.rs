@@ -109,7 +109,7 @@ impl NearestNormals {
     }
 
     /// What [`Self::memory_bytes`] of a tile of so many texels is at most.
-    pub fn most_bytes(texels: usize) -> usize {
+    pub(crate) fn most_bytes(texels: usize) -> usize {
         leaves::MOST_BYTES + texels * TEXEL_BYTES
     }
 

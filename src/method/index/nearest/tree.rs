@@ -37,7 +37,7 @@ impl Neighbour {
 
 /// Squared Euclidean distance in f64, summed x, y, z.
 #[inline]
-pub fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f64 {
+pub(crate) fn squared_distance(a: [f32; 3], b: [f32; 3]) -> f64 {
     let [x, y, z] = [0, 1, 2].map(|axis| f64::from(a[axis]) - f64::from(b[axis]));
     (x * x + y * y + z * z).min(f64::INFINITY) // what is not a number becomes infinite
 }
@@ -155,6 +155,6 @@ impl Node {
 
 /// The point of a box that is nearest to another.
 #[inline]
-pub fn nearest_of_box(to: [f32; 3], low: [f32; 3], high: [f32; 3]) -> [f32; 3] {
+pub(crate) fn nearest_of_box(to: [f32; 3], low: [f32; 3], high: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|axis| to[axis].max(low[axis]).min(high[axis]))
 }

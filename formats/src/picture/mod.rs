@@ -16,6 +16,7 @@
 
 mod alpha;
 pub(crate) mod aspect;
+pub(crate) mod exif;
 pub mod exr;
 mod foreign;
 mod hdr;

@@ -12,6 +12,7 @@
 mod colours;
 mod decompress;
 mod directory;
+pub(super) mod exif;
 mod layout;
 mod pixels;
 mod remarks;
@@ -20,39 +21,38 @@ mod stack;
 use super::{Picture, PictureHeader};
 use crate::{Limits, Result, SampleType};
 
-use directory::{Directory, tag};
+use directory::Directory;
 use layout::Layout;
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
-    Ok(of_layout(&Layout::read(bytes, limits)?))
+    Ok(of_layout(&layout(bytes, limits)?))
 }
 
 pub(super) fn check(bytes: &[u8], limits: &Limits) -> Result<PictureHeader> {
-    let layout = Layout::read(bytes, limits)?;
-    layout.require_data(bytes)?;
-    Ok(of_layout(&layout))
+    Ok(of_layout(&layout_with_data(bytes, limits)?))
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture> {
-    let layout = Layout::read(bytes, limits)?;
-    layout.require_data(bytes)?;
+    let layout = layout_with_data(bytes, limits)?;
     let samples = pixels::read(bytes, &layout)?;
     let PictureHeader { width, height, channels, .. } = of_layout(&layout);
     Ok(Picture { width, height, channels, samples })
 }
 
-/// The orientation that the first directory of a TIFF, or of Exif data, asks for; 1 where it says nothing.
-pub(super) fn orientation(bytes: &[u8]) -> Result<u64> {
-    Directory::first(bytes)?.number(tag::ORIENTATION, Some(1))
+/// The layout of the one picture of a file.
+fn layout(bytes: &[u8], limits: &Limits) -> Result<Layout> {
+    let directory = Directory::read(bytes)?;
+    let layout = Layout::read(&directory, bytes, limits)?;
+    stack::require_single(&directory, &layout, bytes.len())?;
+    Ok(layout)
 }
 
-/// The colour space that Exif data state (tag 40961 in the directory that tag 34665 leads to).
-pub(super) fn exif_colour_space(bytes: &[u8]) -> Result<Option<u64>> {
-    let first = Directory::first(bytes)?;
-    let Some(offset) = first.list(tag::EXIF_IFD)?.and_then(|list| list.first().copied()) else {
-        return Ok(None);
-    };
-    Ok(first.sibling(offset)?.list(tag::COLOUR_SPACE)?.and_then(|list| list.first().copied()))
+/// The same with its data, whose strips are all there.
+fn layout_with_data(bytes: &[u8], limits: &Limits) -> Result<Layout> {
+    let layout = layout(bytes, limits)?;
+    layout.require_data(bytes)?;
+    stack::require_short_strips(&layout)?;
+    Ok(layout)
 }
 
 fn of_layout(layout: &Layout) -> PictureHeader {

@@ -17,7 +17,7 @@ use super::{Console, bytes_text};
 #[command(after_help = "\
 Examples:
   btf tile wood.zarr wood.model.zarr && btf curve wood.zarr wood.model.zarr
-  btf curve wood.zarr wood.model.zarr --most 256 --out curve.png
+  btf curve wood.zarr wood.model.zarr --most 256 --picture curve.png
   btf curve wood.zarr wood.model.zarr --json > curve.json
 For 1, 2, 4 ... clusters: the weighted mean |dL*| of texels from their centres, the bytes of representatives and index,
 and how many times smaller they are than the raw measurement. Of a tile that does not fit in 192 MiB, a sample is
@@ -28,8 +28,8 @@ pub(super) struct Curve {
     /// The model with the tile
     model: PathBuf,
     /// Also write a chart: .png, .jpg, .webp or .tif
-    #[arg(long, short, value_name = "FILE")]
-    out: Option<PathBuf>,
+    #[arg(long, alias = "out", value_name = "FILE")]
+    picture: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -43,7 +43,7 @@ pub(super) struct Curve {
 
 impl Curve {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
-        self.out.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
+        self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let plan = curve::plan(&curve::Options {
             measurement: self.measurement.clone(),
             model: self.model.clone(),
@@ -60,7 +60,7 @@ impl Curve {
         } else {
             print_curve(&curve, console);
         }
-        if let Some(path) = &self.out {
+        if let Some(path) = &self.picture {
             curve.chart().draw().write(path, context.existing)?;
         }
         Ok(())

@@ -1,7 +1,6 @@
 use std::path::PathBuf;
 
-use btfkit::disk::output::{prepare_bytes, publish_all};
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::likeness::Measure;
 use btfkit::picture::Ending;
 use btfkit::run::Context;
@@ -11,15 +10,16 @@ use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
-use super::Console;
 use super::table::{row, table};
+use super::{Console, as_json};
 
 /// Rate how near an enlargement is to the real material: 1 is as near as another real piece of it
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf judge wood-4k.zarr --against wood.zarr
-  btf judge wood-4k.zarr --against wood.zarr --sheet judged.png --json judged.json
+  btf judge wood-4k.zarr --against wood.zarr --picture judged.png
+  btf judge wood-4k.zarr --against wood.zarr --json > judged.json
   btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless surface of a model
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
 J is the worst of five measures; 1 is as near as another real crop. docs/how-to/judge.md says what each measure sees.")]
@@ -43,17 +43,17 @@ pub(super) struct Judge {
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]
     #[arg(long, value_name = "N")]
     crop: Option<usize>,
-    /// Also write all figures to a JSON file
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
     /// Also write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
-    #[arg(long, value_name = "FILE")]
-    sheet: Option<PathBuf>,
+    #[arg(long, alias = "sheet", value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 impl Judge {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
-        if let Some(path) = &self.sheet {
+        if let Some(path) = &self.picture {
             Ending::of(path, &Ending::DISPLAY)?;
         }
         let (report, sheet) = judge::run(
@@ -67,17 +67,14 @@ impl Judge {
             },
             context,
         )?;
-        console.text(&text_of(&report));
-        let mut files = Vec::new();
-        if let Some(path) = &self.json {
-            let text =
-                serde_json::to_string_pretty(&report).map_err(|error| Error::internal(error.to_string()))?;
-            files.push(prepare_bytes(path, context.existing, text.as_bytes())?);
+        if self.json {
+            console.plan(&as_json(&report)?)?;
+        } else {
+            console.text(&text_of(&report));
         }
-        if let Some(path) = &self.sheet {
-            files.push(sheet.prepare(path, context.existing)?);
+        if let Some(path) = &self.picture {
+            sheet.write(path, context.existing)?;
         }
-        publish_all(files)?;
         Ok(())
     }
 }

@@ -141,29 +141,23 @@ impl Leather {
     }
 }
 
-fn json(path: &Path) -> Value {
-    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+/// The figures of a judgement.
+fn figures(command: &mut Command) -> Value {
+    serde_json::from_str(&succeed(command.arg("--json"))).unwrap()
 }
 
 #[test]
 fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
     let leather = Leather::new();
-    for threads in ["1", "3"] {
-        let [report, sheet] = ["json", "png"].map(|ending| leather.at(&format!("{threads}.{ending}")));
+    let [(report, sheet), (again, other_sheet)] = ["1", "3"].map(|threads| {
+        let sheet = leather.at(&format!("{threads}.png"));
         let mut command = leather.judge("big.zarr");
-        command.arg("--json").arg(&report).arg("--sheet").arg(&sheet).args(["--threads", threads]);
-        let told = succeed(&mut command);
-        assert!(
-            told.contains("quadrants of the measurement") && told.contains("enlargement alone"),
-            "{told}"
-        );
-    }
-    for ending in ["json", "png"] {
-        let [one, three] =
-            ["1", "3"].map(|threads| std::fs::read(leather.at(&format!("{threads}.{ending}"))).unwrap());
-        assert!(one == three, "{ending}");
-    }
-    let report = json(&leather.at("1.json"));
+        command.arg("--picture").arg(&sheet).args(["--threads", threads]);
+        (figures(&mut command), std::fs::read(sheet).unwrap())
+    });
+    assert!(report == again && sheet == other_sheet);
+    let told = succeed(&mut leather.judge("big.zarr"));
+    assert!(told.contains("quadrants of the measurement") && told.contains("enlargement alone"), "{told}");
     assert_eq!((&report["origin"], &report["crop"]), (&"quadrants".into(), &96.into()));
     assert_eq!(report["size"], serde_json::json!([256, 288]));
     let pairs = report["pairs"].as_array().unwrap();
@@ -187,9 +181,8 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
     assert!(share("largest_copy") > 0.0 && share("largest_copy") < 0.5, "{}", report["verdict"]);
 
     // A part of the endless plane from the same seed is the same surface.
-    let plane = leather.at("plane.json");
-    succeed(leather.judge("a.model.zarr").args(["--size", "288x256"]).arg("--json").arg(&plane));
-    let (mut plane, mut stored) = (json(&plane), report);
+    let plane = figures(leather.judge("a.model.zarr").args(["--size", "288x256"]));
+    let (mut plane, mut stored) = (plane, report);
     for report in [&mut plane, &mut stored] {
         report.as_object_mut().unwrap().remove("subject");
     }
@@ -204,9 +197,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
             .arg(&paper)
             .args(["--size", "256x256", "--method", "paper"]),
     );
-    let report = leather.at("paper.json");
-    succeed(leather.judge("paper.zarr").arg("--json").arg(&report).args(["--pair", "0,1", "--crop", "64"]));
-    let report = json(&report);
+    let report = figures(leather.judge("paper.zarr").args(["--pair", "0,1", "--crop", "64"]));
     assert!(report["mean"]["alone"].is_null() && report["verdict"]["largest_copy"].is_null());
     assert!(report["normals"]["reason"].as_str().unwrap().contains("--keep-normals"));
     assert_eq!((report["pairs"].as_array().unwrap().len(), &report["crop"]), (1, &64.into()));
@@ -216,7 +207,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
         (&["--pair", "3"], 2, "VIEW,LIGHT"),
         (&["--crop", "100"], 2, "multiple of 16"),
         (&["--size", "9x9"], 2, "--size is for a model"),
-        (&["--sheet", "sheet.exr"], 2, ".png"),
+        (&["--picture", "sheet.exr"], 2, ".png"),
     ] {
         let told = fail(leather.judge("big.zarr").args(arguments), code);
         assert!(told.contains(part), "{told}");
@@ -269,8 +260,7 @@ fn floor_of_stones(at: &Path) {
 #[test]
 fn where_an_enlargement_of_a_regular_material_begins_does_not_matter() {
     let folder = tempfile::tempdir().unwrap();
-    let [archive, store, model, report] =
-        ["a.npy", "a.zarr", "a.model.zarr", "a.json"].map(|name| folder.path().join(name));
+    let [archive, store, model] = ["a.npy", "a.zarr", "a.model.zarr"].map(|name| folder.path().join(name));
     floor_of_stones(&archive);
     succeed(btf().arg("import").args([&archive, &store]));
     succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
@@ -285,10 +275,9 @@ fn where_an_enlargement_of_a_regular_material_begins_does_not_matter() {
             .arg(&model)
             .arg("--against")
             .arg(&store)
-            .args(["--size", size, "--force"])
+            .args(["--size", size])
             .args(["--pair", "0,0", "--pair", "0,1"]);
-        succeed(command.arg("--json").arg(&report));
-        let report = json(&report);
+        let report = figures(&mut command);
         assert_eq!(report["in_phase_within"], serde_json::json!([48, 48]), "{size}");
         found.push(["own", "alone"].map(|row| report["mean"][row]["j"].as_f64().unwrap()));
         println!("{size}: {:?}", found.last());

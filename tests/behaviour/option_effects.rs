@@ -145,7 +145,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         options: &[
             ("measurement", ITSELF),
             ("model", ITSELF),
-            ("out", Shows(&["--out", "{new}/c.png"], &[])),
+            ("picture", Shows(&["--picture", "{new}/c.png"], &[])),
             ("json", Shows(&["--json"], &[])),
             ("most", Shows(&["--most", "2"], &[])),
             ("seed", Shows(&["--json", "--seed", "9"], &["--json"])),
@@ -210,7 +210,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
             ("pair", OF_LARGER),
             ("crop", OF_LARGER),
             ("json", OF_LARGER),
-            ("sheet", OF_LARGER),
+            ("picture", OF_LARGER),
         ],
     },
 ];

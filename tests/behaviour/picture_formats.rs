@@ -200,9 +200,9 @@ fn a_name_that_no_format_has_is_refused_by_every_command_with_the_list() {
         for (arguments, option) in [
             (
                 vec!["judge", fixture().enlarged().to_str().unwrap(), "--against", store.to_str().unwrap()],
-                "--sheet",
+                "--picture",
             ),
-            (vec!["curve", store.to_str().unwrap(), model.to_str().unwrap()], "--out"),
+            (vec!["curve", store.to_str().unwrap(), model.to_str().unwrap()], "--picture"),
             (vec!["check", store.to_str().unwrap()], "--picture"),
             (vec!["compare", model.to_str().unwrap(), store.to_str().unwrap()], "--picture"),
         ] {

@@ -5,13 +5,13 @@
 
 pub mod adapt;
 mod catalogue;
-mod claims;
 mod container;
 mod files;
 pub mod hdf5;
 mod instead;
 mod matching;
 mod pictures;
+mod plausibility;
 
 use std::io::Read;
 use std::ops::Range;
@@ -189,15 +189,17 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
         }
     };
     options.expect_used(uses, source.as_ref())?;
-    claims::require_channels(source.contents()).map_err(|error| error.context(source.path().display()))?;
+    plausibility::require_channels(source.contents())
+        .map_err(|error| error.context(source.path().display()))?;
     adapt::adapt(source, reading)
 }
 
 /// What a user should know of an archive that its samples do not depend on, a sentence each.
 pub fn notes(source: &dyn Source) -> Vec<String> {
     let contents = source.contents();
-    let doubts = claims::near_directions(contents).into_iter().chain(claims::doubtful_angles(contents));
-    source.notes().into_iter().chain(claims::single_channel(contents)).chain(doubts).collect()
+    let doubts =
+        plausibility::near_directions(contents).into_iter().chain(plausibility::doubtful_angles(contents));
+    source.notes().into_iter().chain(plausibility::single_channel(contents)).chain(doubts).collect()
 }
 
 /// The bytes of a small file beside an archive: a list, a table.

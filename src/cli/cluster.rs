@@ -190,8 +190,8 @@ pub(super) fn run_clusters(
     }
 }
 
-fn taken_plan(model: &Path, from: &Path) -> Result<cluster::TakenPlan> {
-    cluster::plan_taken(&cluster::TakenOptions { model: model.into(), from: from.into() })
+fn taken_plan(model: &Path, from: &Path) -> Result<cluster::ReusePlan> {
+    cluster::plan_reuse(&cluster::ReuseOptions { model: model.into(), from: from.into() })
 }
 
 fn cluster_plan(

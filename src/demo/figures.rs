@@ -23,9 +23,9 @@ pub(super) struct Figures {
     pub(super) field: FieldReport,
     pub(super) compare: compare::Report,
     /// Seam visibility of the second tile.
-    pub(super) companion_visibility: f64,
+    pub(super) second_tile_visibility: f64,
     /// Row and column of the region in its interior.
-    pub(super) companion_origin: [usize; 2],
+    pub(super) second_tile_origin: [usize; 2],
     /// Measured tile and tile by the model, under the light of the comparison.
     pub(super) greys: [Grey; 2],
     pub(super) enlarged: Likeness,
@@ -146,8 +146,8 @@ impl Figures {
             normals: model.report(Stage::Normals)?,
             field: model.report(Stage::Fit)?,
             compare,
-            companion_visibility: seam_visibility(&workshop.features, &workshop.companion.tile),
-            companion_origin: workshop.companion.origin,
+            second_tile_visibility: seam_visibility(&workshop.features, &workshop.second_tile.tile),
+            second_tile_origin: workshop.second_tile.origin,
             greys: [Grey::of(&picture(Subject::Tile)?), Grey::of(&picture(Subject::Modelled)?)],
             enlarged,
             by_paper,

@@ -3,10 +3,10 @@
 //! [`run`] makes a sample, runs every stage on it, and writes one self-contained HTML page with the
 //! pictures and figures. Everything stays in one folder; running again goes on where a run stopped.
 
-pub(crate) mod companion;
 mod figures;
 mod page;
 mod pictures;
+pub(crate) mod second_tile;
 mod story;
 mod times;
 

@@ -6,7 +6,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use btfkit_formats::jpeg::{Chroma, EncodeOptions, encode};
 
-use super::companion::{Companion, companion, stands_at};
+use super::second_tile::{SecondTile, second_tile, stands_at};
 use crate::disk::temporary::write_file;
 use crate::error::{Error, Result};
 use crate::method::tile::{Cut, Features, Tile, cut};
@@ -72,9 +72,9 @@ pub(super) enum Subject {
     /// Synthesised normal map, its first texels to the extent of the tile.
     SynthesisedNormals,
     /// The second tile.
-    Companion,
+    SecondTile,
     /// The second tile with the texels of its own interior tinted.
-    CompanionInterior,
+    SecondTileInside,
     /// The tile repeated over the size of the enlarged picture.
     OneTile,
     /// Both tiles, placed by chance.
@@ -98,7 +98,7 @@ pub(super) struct Workshop {
     pub(super) by_paper: Enlarged,
     pub(super) features: Features,
     pub(super) cut: Cut,
-    pub(super) companion: Companion,
+    pub(super) second_tile: SecondTile,
     pub(super) tile_index: Vec<u16>,
     pub(super) enlarged_index: Vec<u16>,
     pub(super) index_by_paper: Vec<u16>,
@@ -119,9 +119,9 @@ impl Workshop {
             .patch
             .ok_or_else(|| Error::internal(format!("{} has no cut tile", model.path().display())))?;
         let features = features(&measurement, context)?;
-        let (cut, companion) = context.install(|| {
+        let (cut, second_tile) = context.install(|| {
             let first = cut(&features, patch);
-            let second = companion(&features, &first, seed);
+            let second = second_tile(&features, &first, seed);
             (first, second)
         });
         let tile_index = model.index()?;
@@ -134,7 +134,7 @@ impl Workshop {
             by_paper,
             features,
             cut,
-            companion,
+            second_tile,
             tile_index,
             enlarged_index,
             index_by_paper,
@@ -189,14 +189,15 @@ impl Workshop {
                 let size = Size::new(tile.size.height.min(plane.height), tile.size.width.min(plane.width));
                 false_color::normals(size, &self.normals_of(size.window())?)
             }
-            Subject::Companion => measured(&self.companion.tile)?,
-            Subject::CompanionInterior => {
-                let tinted: Vec<u8> = self.companion.inside.iter().map(|&inside| u8::from(inside)).collect();
-                false_color::seams(&measured(&self.companion.tile)?, &tinted)
+            Subject::SecondTile => measured(&self.second_tile.tile)?,
+            Subject::SecondTileInside => {
+                let tinted: Vec<u8> =
+                    self.second_tile.inside.iter().map(|&inside| u8::from(inside)).collect();
+                false_color::seams(&measured(&self.second_tile.tile)?, &tinted)
             }
             Subject::OneTile => measured(tile)?.repeated(plane),
             Subject::TwoTiles => {
-                let tiles = [measured(tile)?, measured(&self.companion.tile)?];
+                let tiles = [measured(tile)?, measured(&self.second_tile.tile)?];
                 laid(&tiles, plane, |row, column| stands_at(self.seed, row, column))
             }
             Subject::Enlarged(lit) => self.modelled(plane, &self.enlarged_index, lit)?,

@@ -7,7 +7,7 @@ use crate::demo::{Settings, names};
 
 pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
     let size = settings.enlarged;
-    let [row, column] = figures.companion_origin;
+    let [row, column] = figures.second_tile_origin;
     let intro = format!(
         "<p>The same area of {size} texels, covered in four ways. The first two lay measured tiles side by \
          side. The other two show the model. The second tile has the borders of the first, so both join in any \
@@ -19,7 +19,7 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
          The <b>default method</b> of <code>btf enlarge</code>, the coherent rule, makes every texel of the surface \
          a texel of the tile, and neighbours continue each other as they do in the tile. Shapes are kept, and \
          there is no regular repeat.</p>",
-        figures.companion_visibility
+        figures.second_tile_visibility
     );
     let shots = vec![
         shot(
@@ -49,10 +49,10 @@ pub(super) fn comparison(figures: &Figures, settings: &Settings) -> Section {
     ];
     let tiles = vec![
         shot("first-tile", Subject::Tile, "<b>The first tile</b>", "The first tile"),
-        shot("second-tile", Subject::Companion, "<b>The second tile</b>", "The second tile"),
+        shot("second-tile", Subject::SecondTile, "<b>The second tile</b>", "The second tile"),
         shot(
             "second-tile-interior",
-            Subject::CompanionInterior,
+            Subject::SecondTileInside,
             "<b>Its interior</b>, tinted; the rest is the first tile",
             "The second tile with its own interior tinted",
         ),

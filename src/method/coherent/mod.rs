@@ -9,9 +9,9 @@
 //! [`fit`] makes an [`Appearance`] from clusters; [`Plane`] evaluates it.
 
 mod appearance;
+mod appearance_image;
 pub mod fit;
 pub mod hash;
-mod level;
 mod plane;
 mod region;
 mod shift;

@@ -1,7 +1,7 @@
 //! The endless plane: any window of it, alone.
 
 use super::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, dims_of, sides_at};
-use super::level::{Features, Level};
+use super::appearance_image::{AppearanceImage, Features};
 use super::region::Region;
 use super::start::Start;
 use crate::error::{Error, Result};
@@ -63,8 +63,8 @@ struct Correction {
 }
 
 enum Levelled {
-    Fine(Level<FINE_DIMS>),
-    Coarse(Level<COARSE_DIMS>),
+    Fine(AppearanceImage<FINE_DIMS>),
+    Coarse(AppearanceImage<COARSE_DIMS>),
 }
 
 impl Plane {
@@ -92,8 +92,8 @@ impl Plane {
         for (number, basis) in appearance.levels.iter().enumerate() {
             let spacing = 1 << number;
             let level = match dims_of(number, count) {
-                FINE_DIMS => Levelled::Fine(Level::fine(&features, basis, spacing, kernel)),
-                _ => Levelled::Coarse(Level::coarse(&features, basis, spacing, kernel)),
+                FINE_DIMS => Levelled::Fine(AppearanceImage::fine(&features, basis, spacing, kernel)),
+                _ => Levelled::Coarse(AppearanceImage::coarse(&features, basis, spacing, kernel)),
             };
             levels.push(Correction { level, passes: basis.passes, repetition: basis.repetition });
             if number + 1 < count {
@@ -236,7 +236,7 @@ impl Plane {
 
     fn correct_by<const D: usize>(
         &self,
-        appearance: &Level<D>,
+        appearance: &AppearanceImage<D>,
         level: usize,
         region: &Region,
         positions: &mut [u32],

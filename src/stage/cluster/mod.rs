@@ -10,8 +10,8 @@ pub mod curve;
 mod finish;
 mod initial;
 mod pass;
+mod reuse;
 mod stream;
-mod taken;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ use crate::store::origin;
 use crate::words::counted;
 pub(crate) use budget::enough_bytes;
 use pass::{Next, Work};
-pub use taken::{Options as TakenOptions, Plan as TakenPlan, plan as plan_taken};
+pub use reuse::{Options as ReuseOptions, Plan as ReusePlan, plan as plan_reuse};
 
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;

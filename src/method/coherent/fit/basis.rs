@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::method::coherent::appearance::{Basis, FEATURES, INPUTS, dims_of, passes_of, repetition_of};
-use crate::method::coherent::level::Features;
+use crate::method::coherent::appearance_image::Features;
 
 /// Texels that a basis is fitted to; of larger exemplars every n-th row and column.
 const TEXELS: usize = 1 << 16;

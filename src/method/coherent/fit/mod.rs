@@ -7,7 +7,7 @@ mod features;
 pub use features::{Clusters, features};
 
 use super::appearance::{Appearance, FEATURES, levels_of};
-use super::level::Features;
+use super::appearance_image::Features;
 use crate::lattice::WaveCounts;
 use crate::shape::Window;
 

@@ -65,7 +65,7 @@ impl Features {
 }
 
 /// Appearance of every texel of the exemplar at a level, with a margin of the level's spacing on every side that wraps.
-pub(super) struct Level<const D: usize> {
+pub(super) struct AppearanceImage<const D: usize> {
     /// Spacing h of the level in texels.
     pub(super) spacing: usize,
     /// Texels of a row, margins included.
@@ -77,19 +77,19 @@ pub(super) struct Level<const D: usize> {
 /// The kernel that reduces the surroundings of texels.
 type Project<const D: usize> = fn(Kernel, &[[i16; INPUTS]], &Projection<INPUTS, D>, &mut [[i8; D]]);
 
-impl Level<FINE_DIMS> {
+impl AppearanceImage<FINE_DIMS> {
     pub(super) fn fine(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel) -> Self {
         Self::new(features, basis, spacing, kernel, project_fine)
     }
 }
 
-impl Level<COARSE_DIMS> {
+impl AppearanceImage<COARSE_DIMS> {
     pub(super) fn coarse(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel) -> Self {
         Self::new(features, basis, spacing, kernel, project_coarse)
     }
 }
 
-impl<const D: usize> Level<D> {
+impl<const D: usize> AppearanceImage<D> {
     fn new(features: &Features, basis: &Basis, spacing: usize, kernel: Kernel, project: Project<D>) -> Self {
         let projection = Projection {
             weights: std::array::from_fn(|d| std::array::from_fn(|n| basis.weights[n * D + d])),

@@ -14,7 +14,7 @@ use crate::random::Hash;
 const DRAWN: u32 = 1000;
 
 /// A tile that joins the first one on every side.
-pub(crate) struct Companion {
+pub(crate) struct SecondTile {
     /// Its texels as sources in the measurement; its size is that of the first tile.
     pub tile: Tile,
     /// Row and column in the measurement of the region that became its interior.
@@ -23,9 +23,9 @@ pub(crate) struct Companion {
     pub inside: Vec<bool>,
 }
 
-/// Cuts a companion of `first`: of the regions drawn at random, those that share least with it, and
-/// of these the one whose four paths cost least. The same seed cuts the same companion.
-pub(crate) fn companion(features: &Features, first: &Cut, seed: u64) -> Companion {
+/// Cuts a second tile beside `first`: of the regions drawn at random, those that share least with it, and
+/// of these the one whose four paths cost least. The same seed cuts the same second tile.
+pub(crate) fn second_tile(features: &Features, first: &Cut, seed: u64) -> SecondTile {
     let hash = Hash::new(seed, u32::from_be_bytes(*b"pair"));
     let Patch { height, width, .. } = first.patch;
     let draw = |number: u32| {
@@ -80,7 +80,7 @@ impl Border {
 }
 
 /// The first tile outside the paths, the region inside all four.
-fn join(first: &Cut, border: &Border, origin: [usize; 2]) -> Companion {
+fn join(first: &Cut, border: &Border, origin: [usize; 2]) -> SecondTile {
     let size = first.tile.size;
     let (mut source, mut inside) = (Vec::with_capacity(size.texels()), Vec::with_capacity(size.texels()));
     for row in 0..size.height {
@@ -97,10 +97,10 @@ fn join(first: &Cut, border: &Border, origin: [usize; 2]) -> Companion {
             });
         }
     }
-    Companion { tile: Tile { size, source, wraps: true }, origin, inside }
+    SecondTile { tile: Tile { size, source, wraps: true }, origin, inside }
 }
 
-/// Whether the companion stands at a place (row, column of tiles) of a plane laid with both: a coin
+/// Whether the second tile stands at a place (row, column of tiles) of a plane laid with both: a coin
 /// hashed from the place, so that neither order nor size of the plane matters.
 pub(crate) fn stands_at(seed: u64, row: usize, column: usize) -> bool {
     Hash::new(seed, u32::from_be_bytes(*b"coin")).below(2, row as u32, column as u32, 0) == 1
@@ -139,7 +139,7 @@ mod tests {
     fn borders_are_the_first_tiles_and_the_middle_is_the_regions() {
         let features = smooth(Size::new(90, 100));
         let first = first(&features);
-        let Companion { tile, origin, inside } = companion(&features, &first, 1);
+        let SecondTile { tile, origin, inside } = second_tile(&features, &first, 1);
         for row in 0..40 {
             for column in 0..48 {
                 let at = row * 48 + column;
@@ -159,7 +159,7 @@ mod tests {
     fn the_region_is_among_those_that_share_least_with_the_first_tile() {
         let features = smooth(Size::new(90, 100));
         let first = first(&features);
-        let Companion { origin, .. } = companion(&features, &first, 1);
+        let SecondTile { origin, .. } = second_tile(&features, &first, 1);
         // A region at a random place of the 51 x 53 shares 484 texels with the patch on average.
         assert!(shared(first.patch, origin) < 484, "{origin:?}");
     }
@@ -168,7 +168,7 @@ mod tests {
     fn paths_join_better_than_a_straight_cut() {
         let features = smooth(Size::new(90, 100));
         let first = first(&features);
-        let cut = companion(&features, &first, 1);
+        let cut = second_tile(&features, &first, 1);
         let straight =
             Border { left: vec![5; 40], right: vec![5; 40], top: vec![5; 48], bottom: vec![5; 48], cost: 0 };
         let pasted = join(&first, &straight, cut.origin);
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn about_half_of_the_places_get_the_companion() {
+    fn about_half_of_the_places_get_the_second_tile() {
         let count = (0..100).flat_map(|y| (0..100).map(move |x| (y, x))).filter(|&(y, x)| stands_at(3, y, x));
         assert!((4700..5300).contains(&count.count()));
     }

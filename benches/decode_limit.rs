@@ -6,7 +6,7 @@
 //! conversion as in an import, without its check of the structure.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-use btfkit::stage::import::Shard;
+use btfkit::run::shard::Shard;
 use btfkit_formats::Limits;
 use btfkit_formats::ubo2003::Catalogue;
 use btfkit_formats::zip::ZipIndex;

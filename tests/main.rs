@@ -78,6 +78,8 @@ mod recipes;
 mod safety;
 #[path = "behaviour/setup.rs"]
 mod setup;
+#[path = "behaviour/shares.rs"]
+mod shares;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

@@ -5,8 +5,8 @@ use btfkit::error::Result;
 use btfkit::method::cluster::centre::CentreRule;
 use btfkit::method::cluster::lloyd::Limits;
 use btfkit::run::Context;
+use btfkit::run::shard::Shard;
 use btfkit::stage::cluster::{self, Amount, First, Step, Stepped};
-use btfkit::stage::import::Shard;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
@@ -111,8 +111,8 @@ pub(super) struct Cluster {
     /// Number of the pass, from 0; a pass that is finished is not done again [default: the latest]
     #[arg(long, requires = "step", value_name = "N")]
     pass: Option<usize>,
-    /// Assign only part K of N of the texels, K from 0
-    #[arg(long, requires = "step", value_name = "K/N", default_value = "0/1")]
+    /// Assign only part K of N of the texels, K from 0; `env` takes both from the variables of Slurm or MPI
+    #[arg(long, requires = "step", value_name = "K/N|env", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use btfkit::error::{Error, Result};
 use btfkit::method::coherent::JITTER_ONE;
 use btfkit::run::Context;
+use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
 use btfkit::stage::enlarge::patches::Pieces;
 use btfkit::stage::enlarge::{self, By, Report, Verdict, coherent, paper, patches, quilt};
-use btfkit::stage::import::Shard;
 use btfkit::store::model;
 use clap::{Args, ValueEnum};
 
@@ -59,8 +59,9 @@ pub(super) struct Enlarge {
     /// the error names the nearest that fit
     #[arg(long)]
     tileable: bool,
-    /// Make only part K of N, K from 0, so that N jobs share the work, in any order (all but paper, quilt)
-    #[arg(long, value_name = "K/N", default_value = "0/1")]
+    /// Make only part K of N, K from 0, so that N jobs share the work, in any order (all but paper, quilt); `env` takes
+    /// both from the variables of Slurm or MPI
+    #[arg(long, value_name = "K/N|env", default_value = "0/1")]
     shard: Shard,
     /// How far pieces are shifted at random, from 0 to 1 (coherent). More repeats less; less fits better [default: 0.5,
     /// and 0 for regular materials]

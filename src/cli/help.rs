@@ -17,13 +17,14 @@ use super::terminal::{of_output, pieces};
 use super::{Cli, Console};
 
 /// Commands by what they are for, in the order of the work.
-const GROUPS: [(&str, &[&str]); 7] = [
+const GROUPS: [(&str, &[&str]); 8] = [
     ("Try", &["demo", "sample"]),
     ("Convert", &["import", "export"]),
     ("Check", &["info", "check", "verify"]),
     ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
     ("Enlarge", &["enlarge", "judge"]),
     ("Look", &["image"]),
+    ("Share work", &["status", "missing"]),
     ("Set up", &["completions", "man", "help"]),
 ];
 

@@ -3,7 +3,8 @@ use std::path::{Path, PathBuf};
 use btfkit::error::{Error, Result};
 use btfkit::run::Context;
 use btfkit::run::progress::{Counted, Progress};
-use btfkit::stage::import::{self, Report, Shard};
+use btfkit::run::shard::Shard;
+use btfkit::stage::import::{self, Report};
 use btfkit::store::measurement::Description;
 use btfkit::store::recognise::expect_readable;
 use btfkit::words::counted;
@@ -42,8 +43,9 @@ pub(super) struct Import {
     /// How to pack samples: `predictive` is smaller and faster, but zarr-python needs a module to read it
     #[arg(long, value_name = "stock|predictive", default_value = "stock")]
     codec: Chain,
-    /// Import only part K of N of the views, K from 0, so that N jobs share the work, in any order
-    #[arg(long, value_name = "K/N", default_value = "0/1")]
+    /// Import only part K of N of the views, K from 0, so that N jobs share the work, in any order; `env` takes both
+    /// from the variables of Slurm or MPI
+    #[arg(long, value_name = "K/N|env", default_value = "0/1")]
     shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]

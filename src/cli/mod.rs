@@ -26,6 +26,7 @@ mod progress;
 mod sample;
 mod scene;
 mod source;
+mod status;
 mod table;
 mod terminal;
 mod tile;
@@ -133,6 +134,8 @@ enum Command {
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
     Judge(judge::Judge),
+    Status(status::StatusOf),
+    Missing(status::Missing),
     Completions(help::Completions),
     Man(help::Manual),
 }
@@ -266,6 +269,8 @@ impl Command {
                 | Self::Info(_)
                 | Self::Judge(_)
                 | Self::Appearance(_)
+                | Self::Status(_)
+                | Self::Missing(_)
                 | Self::Completions(_)
                 | Self::Man(_)
         )
@@ -286,6 +291,8 @@ impl Command {
             Self::Check(command) => return command.run(given, context, console),
             Self::Import(command) => return command.run(context, console),
             Self::Verify(command) => return command.run(given, context, console),
+            Self::Status(command) => return command.run(context, console),
+            Self::Missing(command) => command.run(console),
             Self::Model(command) => return command.run(context, console),
             Self::Enlarge(command) => return command.run(context, console),
             Self::Demo(command) => command.run(context, console),

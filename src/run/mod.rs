@@ -5,6 +5,7 @@ pub mod budget;
 pub mod progress;
 pub(crate) mod read_ahead;
 pub mod recipe;
+pub mod shard;
 pub mod units;
 
 use std::sync::Arc;

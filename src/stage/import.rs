@@ -11,6 +11,7 @@ use crate::color::{Remarkable, Transfer};
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
 use crate::run::recipe::Recipe;
+use crate::run::shard::Shard;
 use crate::run::units::each_at_once;
 use crate::run::{Context, read_ahead};
 use crate::shape::Size;
@@ -36,37 +37,6 @@ impl Options {
     /// All views; reflectance 1 is white; packed so that every reader of Zarr opens the store.
     pub fn new(store: impl Into<PathBuf>) -> Self {
         Self { store: store.into(), white: 1.0, codec: Chain::Stock, shard: Shard::WHOLE }
-    }
-}
-
-/// Part `part` of `parts` of the units of a stage: every `parts`-th.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
-    /// 0-based.
-    pub part: usize,
-    /// At least 1.
-    pub parts: usize,
-}
-
-impl Shard {
-    /// All units.
-    pub const WHOLE: Self = Self { part: 0, parts: 1 };
-
-    /// Whether a unit belongs to this part.
-    pub fn has(self, unit: usize) -> bool {
-        unit % self.parts == self.part
-    }
-}
-
-impl std::str::FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let expected = || format!("expected K/N with K from 0 to N - 1, such as 0/4, got {text:?}");
-        let (part, parts) = text.split_once('/').ok_or_else(expected)?;
-        let number = |text: &str| text.trim().parse::<usize>().map_err(|_| expected());
-        let shard = Self { part: number(part)?, parts: number(parts)? };
-        if shard.part < shard.parts { Ok(shard) } else { Err(expected()) }
     }
 }
 
@@ -266,25 +236,4 @@ pub fn default_store(archive: &Path, folder: &Path) -> PathBuf {
     let mut name = archive.file_stem().unwrap_or_default().to_owned();
     name.push(".zarr");
     folder.join(name)
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn every_unit_belongs_to_one_part_and_parts_differ_by_one_unit_at_most() {
-        for parts in 1..9 {
-            let shards: Vec<Shard> =
-                (0..parts).map(|part| format!("{part}/{parts}").parse().unwrap()).collect();
-            assert!((0..81).all(|unit| shards.iter().filter(|shard| shard.has(unit)).count() == 1));
-            let counts: Vec<usize> =
-                shards.iter().map(|shard| (0..81).filter(|&unit| shard.has(unit)).count()).collect();
-            assert!(counts.iter().max().unwrap() - counts.iter().min().unwrap() <= 1, "{counts:?}");
-        }
-        for text in ["", "1", "4/4", "-1/2", "0/0", "a/b"] {
-            assert!(text.parse::<Shard>().is_err(), "{text}");
-        }
-    }
 }

@@ -16,5 +16,6 @@ pub(crate) mod kept;
 pub mod loss;
 pub mod normals;
 pub mod sample;
+pub mod status;
 pub mod tile;
 pub mod verify;

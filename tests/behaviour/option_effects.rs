@@ -117,6 +117,20 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "status",
+        base: &["{measurement}"],
+        options: &[("stores", ITSELF), ("json", Shows(&["--json"], &[]))],
+    },
+    Outputs {
+        command: "missing",
+        base: &["{measurement}", "--shards", "4"],
+        options: &[
+            ("store", ITSELF),
+            ("shards", Unseen("nothing is missing; shares::what_is_missing_is_told tries it")),
+            ("format", Unseen("nothing is missing; shares::what_is_missing_is_told tries it")),
+        ],
+    },
+    Outputs {
         command: "verify",
         base: &["{measurement}"],
         options: &[

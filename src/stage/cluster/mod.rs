@@ -31,7 +31,7 @@ use crate::method::tile::Tile;
 use crate::names::with_ending;
 use crate::run::Context;
 use crate::run::recipe::{self, Recipe};
-use crate::stage::import::Shard;
+use crate::run::shard::Shard;
 use crate::store::clustering::{Passes, State};
 use crate::store::measurement::Measurement;
 use crate::store::model::clusters::ClusterRecipe;

@@ -13,11 +13,11 @@ use crate::method::cluster::tally::Tally;
 use crate::method::cluster::total_distance;
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::shard::Shard;
 use crate::stage::cluster::budget::Budget;
 use crate::stage::cluster::finish::Clustered;
 use crate::stage::cluster::stream::Stream;
 use crate::stage::cluster::{Amount, Plan, Report, Stepped};
-use crate::stage::import::Shard;
 use crate::store::clustering::{BatchPass, Found, History, Passes, State};
 
 /// What follows a pass.

@@ -2,6 +2,8 @@
 //! make any window alone. Nothing is kept between blocks, so any process makes any of them in any order, and a killed
 //! run goes on with those that are missing.
 
+use std::collections::BTreeMap;
+
 use super::{Output, Subject, Units};
 use crate::error::Result;
 use crate::run::progress::Counted;
@@ -142,6 +144,26 @@ fn blocks(size: Size, shards: usize) -> impl Iterator<Item = Window> {
             size: Size::new(side.min(size.height - y), side.min(size.width - x)),
         })
     })
+}
+
+/// How many blocks an enlarged index has, and the numbers of those that are whole on the disk, ascending.
+pub(crate) fn blocks_done(enlarged: &Enlarged) -> (usize, Vec<usize>) {
+    let Size { height, width } = enlarged.shards();
+    let across = width.div_ceil(BLOCK_SHARDS);
+    let mut found: BTreeMap<usize, usize> = BTreeMap::new();
+    for [row, column] in enlarged.shards_found() {
+        if enlarged.has_shard(row, column) {
+            *found.entry(row / BLOCK_SHARDS * across + column / BLOCK_SHARDS).or_default() += 1;
+        }
+    }
+    let side = |all: usize, block: usize| BLOCK_SHARDS.min(all - block * BLOCK_SHARDS);
+    let whole = |&(block, shards): &(usize, usize)| {
+        shards == side(height, block / across) * side(width, block % across)
+    };
+    (
+        height.div_ceil(BLOCK_SHARDS) * across,
+        found.into_iter().filter(whole).map(|(block, _)| block).collect(),
+    )
 }
 
 /// The shards of a block.

@@ -16,13 +16,15 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+pub(crate) use blocks::blocks_done;
+
 use crate::error::{Error, Result};
 use crate::names::{ends_with, with_ending};
 use crate::run::Context;
 use crate::run::recipe::Recipe;
+use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::cluster;
-use crate::stage::import::Shard;
 use crate::store::enlarged::{EnlargeRecipe, Enlarged, Method};
 use crate::store::model::{Model, Stage, index_bytes};
 use crate::words::counted;

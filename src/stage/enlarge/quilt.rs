@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use crate::method::baseline::{Exemplar, Quilt};
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::shard::Shard;
 use crate::shape::{Size, Window};
-use crate::stage::import::Shard;
 use crate::store::enlarged::{EnlargeRecipe, Method, SHARD_SIDE};
 
 /// Settings of image quilting.

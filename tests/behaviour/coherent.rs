@@ -326,7 +326,9 @@ fn a_picture_of_the_plane_is_that_of_its_stored_index() {
         same();
     }
     // Far from place 0, and in parts, it goes on as it does near it: as the library says.
-    succeed(plane_image(&model, &made, "-600,-2000000000,70,1100").args(["--what", "index"]));
+    let mut far = btf();
+    far.arg("image").arg(&model).args(["--plane", "--window", "-600,-2000000000,70,1100", "--what", "index"]);
+    succeed(far.arg("--force").arg("--out").arg(&made));
     for window in ["-2147483649,0,8,8", "0,2147483641,8,8", "0,0,0,8"] {
         fail(&mut plane_image(&model, &made, window), 2);
     }

@@ -209,7 +209,9 @@ fn a_damaged_enlarged_index_is_refused() {
         move |store: &Path| {
             let mut command = btf();
             command.arg("image").arg(store).arg("--model").arg(model("cut"));
-            command.arg("--measurement").arg(crate::fixture::fixture().measurement());
+            if values == "measured" {
+                command.arg("--measurement").arg(crate::fixture::fixture().measurement());
+            }
             command.args(["--values", values, "--out"]).arg(store.with_extension(format!("{values}.png")));
             command
         }

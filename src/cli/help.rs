@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use btfkit::disk::output::expect_outside_stores;
 use btfkit::disk::temporary::write_file;
 use btfkit::error::{Error, Result};
 use btfkit::text::escaped;
@@ -163,6 +164,8 @@ impl Manual {
 }
 
 fn write_pages(whole: &Command, folder: &Path, console: Console) -> Result<()> {
+    // Of a folder's parent the rest is known.
+    expect_outside_stores(&folder.join("btf.1"))?;
     std::fs::create_dir_all(folder).map_err(|error| Error::io("make", folder, error))?;
     let commands: Vec<&Command> = std::iter::once(whole)
         .chain(whole.get_subcommands().filter(|command| command.get_name() != "help"))

@@ -21,6 +21,7 @@ use crate::demo::figures::Figures;
 use crate::demo::pictures::{Embedded, Workshop, write_and_embed};
 use crate::demo::story::Section;
 use crate::demo::times::Times;
+use crate::disk::output::expect_outside_stores;
 use crate::disk::temporary::write_file;
 use crate::error::Result;
 use crate::lattice::LatticeChoice;
@@ -121,6 +122,7 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Report> {
 
 fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result<Report> {
     let place = |name: &str| folder.join(name);
+    expect_outside_stores(&place(names::RECORD))?;
     let recipe = json!({
         "stage": "demo",
         "material": settings.material(),

@@ -211,7 +211,7 @@ pub(crate) fn write_whole(
 ///
 /// # Errors
 /// [`ErrorKind::Usage`], with the store.
-pub(crate) fn expect_outside_stores(path: &Path) -> Result<()> {
+pub fn expect_outside_stores(path: &Path) -> Result<()> {
     let folder = folder_of(path);
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     match real.ancestors().find(|folder| folder.join(STORE_FILE).is_file()) {

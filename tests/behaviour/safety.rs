@@ -434,6 +434,21 @@ fn no_result_lies_inside_of_a_store() {
         fail(&mut export, 2);
     }
     fail(btf().arg("export").args([&store, &store.join("zoom.dzi")]), 2);
+    // Neither do stores, folders of pages, and the demo.
+    let (archive, measurement, model) = (fixture().archive(), fixture().measurement(), fixture().model());
+    let inside = store.join("new").join("inside.zarr");
+    for command in [
+        vec![Path::new("import"), &archive, &inside],
+        vec![Path::new("import"), &archive, Path::new("--into"), &store],
+        vec![Path::new("model"), &measurement, &inside],
+        vec![Path::new("model"), &measurement, Path::new("--into"), &store],
+        vec![Path::new("enlarge"), &model, &inside, Path::new("--size"), Path::new("64x64")],
+        vec![Path::new("man"), Path::new("--out"), &store],
+        vec![Path::new("demo"), &inside],
+    ] {
+        let told = fail(btf().args(&command), 2);
+        assert!(told.contains("inside of the store"), "{command:?}: {told}");
+    }
     assert_eq!(tree(&store), before);
 }
 

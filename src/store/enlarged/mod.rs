@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::Lock;
+use crate::disk::output::expect_outside_stores;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::shape::{Size, Window};
@@ -82,6 +83,7 @@ impl Enlarged {
         model: &Path,
         context: &Context<'_>,
     ) -> Result<Self> {
+        expect_outside_stores(path)?;
         let mut store = Store::at(path);
         let model_name = model.file_name().map(|name| name.to_string_lossy());
         let Description { size, clusters, tile, keep_source, keep_normals } = *description;

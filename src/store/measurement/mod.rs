@@ -21,6 +21,7 @@ use btfkit_formats::SampleType;
 use serde_json::{Map, Value, json};
 
 use crate::disk::lock::Lock;
+use crate::disk::output::expect_outside_stores;
 use crate::disk::temporary;
 use crate::error::{Error, Result};
 use crate::run::Context;
@@ -92,6 +93,7 @@ impl Measurement {
         context: &Context<'_>,
     ) -> Result<Self> {
         let stored = recipe.to_value()?;
+        expect_outside_stores(path)?;
         let mut store = Store::at(path);
         let radiometry = "apparent reflectance, cosine of the light angle included";
         let lock = store.begin_by_recipe(

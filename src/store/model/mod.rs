@@ -17,6 +17,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
+use crate::disk::output::expect_outside_stores;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::zarr::Store;
@@ -37,6 +38,7 @@ pub struct Model {
 impl Model {
     /// Opens a model, or begins one where there is none.
     pub fn create(path: &Path, context: &Context<'_>) -> Result<Self> {
+        expect_outside_stores(path)?;
         let mut store = Store::at(path);
         let mut attributes = Map::new();
         attributes.insert(STAGES.to_owned(), json!({}));

@@ -180,7 +180,7 @@ fn a_file_appears_whole_or_not_at_all() {
     let mut writer = begun();
     writer.write_view(0, &view_samples(&contents, 0), None).unwrap();
     assert_eq!((path.exists(), files()), (false, 1));
-    assert!(writer.finish().unwrap_err().to_string().contains("samples of 1 views"));
+    assert!(writer.finish().unwrap_err().to_string().contains("samples of 1 view"));
     assert_eq!(files(), 0);
 
     let mut writer = begun();

@@ -87,6 +87,9 @@ const IN_NUMBERS: [&str; 17] = [
 /// Marks behind which other words may stand.
 const MARKS: &str = "_- \t,;.:|=+()[]{}<>#@~&/\\\u{2013}\u{2014}\u{a0}";
 
+/// Of these, the ones that a unit may follow: `0.5_rad`, `0.5 (rad)`.
+const BEFORE_UNITS: [char; 7] = ['_', '-', ' ', '(', '[', '{', '<'];
+
 /// Of these, the ones that digits of their own may follow: a copy's number, `(2)`.
 const BEFORE_COUNTERS: &str = "([{<#@~";
 
@@ -110,17 +113,17 @@ pub(crate) fn unit_behind(rest: &str, digits: Digits) -> Result<Unit, String> {
     let separate = digits == Digits::Separate && marks.chars().all(|mark| BETWEEN_NUMBERS.contains(mark));
     let known = match next.chars().next() {
         _ if marks.is_empty() => false,
-        Some(c) if c.is_numeric() => separate || marks.contains(|c| BEFORE_COUNTERS.contains(c)),
+        Some(c) if c.is_numeric() => separate || is_counter(marks, next),
         Some(c) if c.is_alphabetic() => !is_part_of_number(next),
         _ => false,
     };
     if known { Ok(unit) } else { Err(excerpt(rest)) }
 }
 
-/// A unit that is read, right behind the number or behind a mark, and what follows it: not a letter (`radial`) but for
-/// the next label.
+/// A unit that is read, right behind the number, behind marks or in brackets, and what follows it: not a letter
+/// (`radial`) but for the next label.
 fn stated_unit(rest: &str) -> Option<(Unit, &str)> {
-    let word = rest.strip_prefix(['_', '-', ' ']).unwrap_or(rest);
+    let word = rest.trim_start_matches(BEFORE_UNITS);
     UNITS.iter().find_map(|&(name, unit)| {
         let (found, after) = word.split_at_checked(name.len())?;
         let ends = !after.starts_with(char::is_alphabetic) || starts_with_label(after);
@@ -130,7 +133,7 @@ fn stated_unit(rest: &str) -> Option<(Unit, &str)> {
 
 /// Whether the text of a pattern behind an angle in degrees names another unit.
 pub(crate) fn names_another_unit(text: &str) -> bool {
-    let word = text.strip_prefix(['_', '-', ' ']).unwrap_or(text);
+    let word = text.trim_start_matches(BEFORE_UNITS);
     let label = starts_with_label(text) || starts_with_label(word);
     !label && (matches!(stated_unit(text), Some((Unit::Radians, _))) || is_other_unit(&first_word(word).0))
 }
@@ -140,6 +143,15 @@ fn is_part_of_number(text: &str) -> bool {
     let (word, after) = first_word(text);
     let digits = after.trim_start_matches(['_', '-', ' ', '.']).starts_with(char::is_numeric);
     is_other_unit(&word) || digits && IN_NUMBERS.contains(&word.as_str())
+}
+
+/// Whether a whole number stands right behind a bracket, as that of a copy does: `(2)`, but not `(+0.5)`.
+fn is_counter(marks: &str, next: &str) -> bool {
+    let after = next.trim_start_matches(|c: char| c.is_ascii_digit());
+    let fraction = |text: &str| text.starts_with(|c: char| c.is_numeric());
+    marks.ends_with(|c| BEFORE_COUNTERS.contains(c))
+        && !after.starts_with(|c: char| c.is_alphanumeric())
+        && !after.strip_prefix(['.', ',']).is_some_and(fraction)
 }
 
 /// The letters that a text begins with, small, and the rest.
@@ -169,6 +181,11 @@ mod tests {
     #[test]
     fn what_is_not_known_behind_a_number_is_refused() {
         for rest in [
+            "(+0.5)",
+            "(0.5)",
+            "[2x]",
+            "(gon)",
+            " (mrad)",
             ",5",
             "p5",
             "P5_x",
@@ -292,7 +309,19 @@ mod tests {
         ] {
             assert_eq!(unit_behind(rest, Digits::Doubted), Ok(Unit::Degrees), "{rest}");
         }
-        for rest in ["rad", "RAD_", "radpl5", "radians", "_rad", " rad_", "-radian.x", "_rads"] {
+        for rest in [
+            "rad",
+            "RAD_",
+            "radpl5",
+            "radians",
+            "_rad",
+            " rad_",
+            "-radian.x",
+            "_rads",
+            "(rad)",
+            " [rad]_",
+            "_(radians)",
+        ] {
             assert_eq!(unit_behind(rest, Digits::Doubted), Ok(Unit::Radians), "{rest}");
         }
         for rest in ["_5", "-5", " 5", "_-5", "deg_30"] {

@@ -39,7 +39,7 @@ pub(super) fn of_containers(paths: &[PathBuf]) -> Option<Error> {
         files::is_picture(&name) || files::has_extension(&name, "zip") || files::has_extension(&name, "lp")
     };
     // A set of pictures has faults of its own, whatever else lies there.
-    if files::is_picture(&path.to_string_lossy()) || path.is_dir() && files.iter().any(is_set) {
+    if is_set(path) || path.is_dir() && files.iter().any(is_set) {
         return None;
     }
     let found: Vec<(PathBuf, &str)> = files.into_iter().take(SNIFFED).filter_map(container).collect();

@@ -1,6 +1,7 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
+use btfkit::names::with_ending;
 use btfkit::picture::{Bits, Encoding, Ending};
 use btfkit::run::Context;
 use btfkit::stage::image;
@@ -72,8 +73,8 @@ impl Image {
         let ending = Ending::of(&self.out, &Ending::ALL).map_err(|error| match kind_at(&self.out) {
             Some(_) => error.hint(format!(
                 "--out names the picture, not the store: btf image {} --out {}",
-                self.out.display(),
-                self.source.display()
+                self.source.display(),
+                Path::new(&with_ending(&self.source, &[".zarr"], ".png")).display()
             )),
             None => error,
         })?;

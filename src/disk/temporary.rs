@@ -187,8 +187,19 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 /// away first: at no time does a part of it look like something unfinished.
 ///
 /// # Errors
-/// [`crate::ErrorKind::Recipe`] where it holds a file of another's.
+/// As [`expect_own`].
 pub(crate) fn remove_folder(path: &Path, is_own: impl Fn(&Path) -> bool) -> Result<()> {
+    expect_own(path, is_own)?;
+    let old = temporary_name(path);
+    let removed = fs::rename(path, &old).and_then(|()| fs::remove_dir_all(&old));
+    removed.map_err(|error| Error::io("remove", path, error))
+}
+
+/// Checks that a folder holds nothing but what `is_own` says of paths in it, and temporary files and locks.
+///
+/// # Errors
+/// [`crate::ErrorKind::Recipe`] where it holds a file of another's.
+pub(crate) fn expect_own(path: &Path, is_own: impl Fn(&Path) -> bool) -> Result<()> {
     let mut folders = vec![path.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).map_err(|error| Error::io("list", &folder, error))? {
@@ -209,9 +220,7 @@ pub(crate) fn remove_folder(path: &Path, is_own: impl Fn(&Path) -> bool) -> Resu
             }
         }
     }
-    let old = temporary_name(path);
-    let removed = fs::rename(path, &old).and_then(|()| fs::remove_dir_all(&old));
-    removed.map_err(|error| Error::io("remove", path, error))
+    Ok(())
 }
 
 /// The temporary name beside `path`: process ids repeat across hosts, so it bears host, pid and random bits.

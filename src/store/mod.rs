@@ -40,8 +40,6 @@ fn is_own(path: &Path) -> bool {
         "texels",
         "counts",
     ];
-    let is_number =
-        |text: &str| !text.is_empty() && text.len() < 20 && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_group =
         |name: &&str| ["pass_", "part_"].iter().any(|begin| name.strip_prefix(begin).is_some_and(is_number));
     let Some(parts) = path.iter().map(|part| part.to_str()).collect::<Option<Vec<&str>>>() else {
@@ -50,11 +48,31 @@ fn is_own(path: &Path) -> bool {
     let mut parts = parts.into_iter().skip_while(is_group).peekable();
     let in_array = parts.next_if(|name| ARRAYS.contains(name)).is_some();
     match (in_array, parts.next()) {
-        (_, Some(metadata::FILE)) => parts.next().is_none(),
-        (true, Some("c")) => parts.peek().is_some() && parts.all(is_number),
+        (true, Some(name)) => is_part_of_array(name, parts),
+        (false, Some(metadata::FILE)) => parts.next().is_none(),
         (false, Some(enlarged::state::NAME | origin::MODEL | origin::MEASUREMENT)) => parts.next().is_none(),
         _ => false,
     }
+}
+
+/// Whether a path in the folder of an array is one that a run writes: its metadata, or a chunk.
+pub(crate) fn is_of_array(path: &Path) -> bool {
+    let parts: Option<Vec<&str>> = path.iter().map(|part| part.to_str()).collect();
+    let mut parts = parts.into_iter().flatten();
+    parts.next().is_some_and(|name| is_part_of_array(name, parts))
+}
+
+fn is_part_of_array<'a>(name: &str, rest: impl Iterator<Item = &'a str>) -> bool {
+    let mut rest = rest.peekable();
+    match name {
+        metadata::FILE => rest.next().is_none(),
+        "c" => rest.peek().is_some() && rest.all(is_number),
+        _ => false,
+    }
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.len() < 20 && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// Name of the lock that whoever writes a store by a recipe shares with others who do.

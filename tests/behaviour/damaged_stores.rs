@@ -22,7 +22,7 @@ use btfkit_formats::Direction;
 use serde_json::{Map, Value, json};
 use tempfile::TempDir;
 
-use crate::fixture::{btf, succeed, tree, tree_names};
+use crate::fixture::{btf, fail, fixture, succeed, tree, tree_names};
 
 /// Everything that is damaged here, as small as it can be.
 struct Small {
@@ -486,4 +486,29 @@ fn metadata_that_is_no_small_file_is_refused_without_waiting() {
             }
         });
     }
+}
+
+#[test]
+fn directions_of_another_model_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let mut models = Vec::new();
+    // The same samples, and directions whose triangles may be the same.
+    for (name, turn) in [("a", "0"), ("b", "90")] {
+        let (store, model) = (place(&format!("{name}.zarr")), place(&format!("{name}.model.zarr")));
+        succeed(btf().arg("import").args([&fixture().archive(), &store]).args(["--turn", turn]));
+        succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
+        succeed(btf().arg("cluster").args([&store, &model]).args(["--clusters", "7"]));
+        models.push(model);
+    }
+    succeed(btf().arg("verify").arg(&models[0]));
+    for array in ["light_direction", "light_phi", "light_theta"] {
+        std::fs::remove_dir_all(models[0].join(array)).unwrap();
+        crate::fixture::copy(&models[1].join(array), &models[0].join(array));
+    }
+    let told = fail(btf().arg("verify").arg(&models[0]), 65);
+    assert!(told.contains("light_direction"), "{told}");
+    let picture = place("picture.png");
+    let told = fail(btf().arg("image").arg(&models[0]).arg("--out").arg(&picture), 65);
+    assert!(told.contains("light_direction") && told.contains("checksum") && !picture.exists(), "{told}");
 }

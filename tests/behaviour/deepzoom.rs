@@ -17,7 +17,9 @@ const LIGHT: &str = "30,90";
 fn export(source: &Path, output: &Path) -> Command {
     let mut command = btf();
     command.arg("export").args([source, output]).args(["--deepzoom", "--light", LIGHT]);
-    command.arg("--model").arg(fixture().model());
+    if Enlarged::open(source).is_ok() {
+        command.arg("--model").arg(fixture().model());
+    }
     command
 }
 

@@ -167,7 +167,12 @@ fn a_folder_of_a_container_and_a_file_beside_it_say_what_to_name() {
     succeed(btf().arg("export").arg(fixture().measurement()).arg(&array));
     let said = fail(btf().arg("info").arg(&inner), 65);
     assert!(said.contains("m.npy (a numpy array)") && !said.contains("m.views.npy"), "{said}");
-    // Pictures have faults of their own.
+    // Archives and pictures have faults of their own.
+    let zip = inner.join("a.zip");
+    std::fs::copy(fixture().archive(), &zip).unwrap();
+    let said = fail(btf().arg("info").arg(&zip).args(["--pattern", "img_{theta_i}_{phi_i}.jpg"]), 65);
+    assert!(said.contains("pattern") && !said.contains("name the file"), "{said}");
+    assert!(!fail(btf().arg("info").arg(inner.join("none.zip")), 66).contains("name the file"));
     std::fs::write(inner.join("a.png"), png(9)).unwrap();
     assert!(!refused(&inner).contains("name the file"));
 }

@@ -224,10 +224,10 @@ fn a_name_that_no_format_has_is_refused_by_every_command_with_the_list() {
     let told = fail(&mut image_of(&store, &folder.path().join("a.bmp"), &[]), 2);
     assert!(told.contains(".png, .jpg, .jpeg, .webp, .tif, .tiff, .exr"), "{told}");
     for (name, more, expected) in [
-        ("a.png", ["--quality", "50"], "only JPEG"),
+        ("a.png", ["--quality", "50"], "it is that of a JPEG"),
         ("a.jpg", ["--bits", "16"], "only PNG and TIFF"),
         ("a.webp", ["--bits", "16"], "only PNG and TIFF"),
-        ("a.exr", ["--bits", "16"], "only PNG and TIFF"),
+        ("a.exr", ["--bits", "16"], "holds linear floats"),
     ] {
         let told = fail(&mut image_of(&store, &folder.path().join(name), &more), 2);
         assert!(told.contains(expected), "{told}");

@@ -975,3 +975,26 @@ fn exit_codes_are_those_of_the_table() {
     tried.dedup();
     assert_eq!(told, tried);
 }
+
+#[test]
+fn a_stage_that_is_made_anew_leaves_files_of_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("m.zarr");
+    succeed(&mut model_of(&fixture().measurement(), &model));
+    let again = || {
+        let mut command = btf();
+        command.arg("cluster").args([&fixture().measurement(), &model]).args(["--clusters", "5", "--force"]);
+        command
+    };
+    // Of the stage itself, and of one that builds on it.
+    for place in ["centres", "appearance/features/c"] {
+        let mine = model.join(place).join("notes.txt");
+        fs::write(&mine, b"mine").unwrap();
+        let told = fail(&mut again(), 65);
+        assert!(told.contains("notes.txt is no part of") && !told.contains("run it again"), "{told}");
+        assert_eq!(fs::read(&mine).unwrap(), b"mine");
+        fs::remove_file(&mine).unwrap();
+    }
+    succeed(btf().arg("verify").arg(&model));
+    succeed(&mut again());
+}

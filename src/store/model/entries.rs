@@ -14,9 +14,11 @@ use super::normals::NormalsRecipe;
 use super::tile::TileRecipe;
 use super::{KIND, Model, Stage};
 use crate::disk::lock::Lock;
+use crate::disk::temporary::expect_own;
 use crate::error::{Error, Result};
 use crate::run::recipe::{self, Made, Recipe};
 use crate::run::{Context, Existing};
+use crate::store::is_of_array;
 use crate::zarr::Layout;
 use crate::zarr::metadata::OLDEST_FORMAT;
 
@@ -199,18 +201,23 @@ impl Model {
             let _lock = self.store.lock("", context)?;
             let attributes = self.store.expect(KIND)?;
             let mut entries = self.parse_entries(&attributes)?;
+            let mut later = Vec::new();
             for taken in stage.builders().iter().chain([&stage]) {
                 let Some(entry) = entries.remove(taken) else { continue };
                 let of_stage = self.arrays(*taken, &entry.report).unwrap_or_default();
                 arrays.extend(of_stage.into_iter().map(|(name, _)| name));
-                if *taken != stage {
-                    context.progress.notice(&format!(
-                        "{}: stage {} built on what is made anew: run it again (btf {}, or btf model)",
-                        self.path().display(),
-                        taken.name(),
-                        taken.name()
-                    ));
-                }
+                later.extend((*taken != stage).then(|| taken.name()));
+            }
+            // Before anything is taken back.
+            for folder in arrays.iter().map(|array| self.path().join(array)).filter(|folder| folder.is_dir())
+            {
+                expect_own(&folder, is_of_array)?;
+            }
+            for name in later {
+                context.progress.notice(&format!(
+                    "{}: stage {name} built on what is made anew: run it again (btf {name}, or btf model)",
+                    self.path().display(),
+                ));
             }
             self.write_root(attributes, entries)?;
             stage.builders().iter().chain([&stage]).for_each(|taken| self.store.forget(taken.name()));

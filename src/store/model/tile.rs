@@ -154,7 +154,29 @@ impl Model {
 
     /// View directions and light directions.
     pub fn directions(&self) -> Result<[Vec<Direction>; 2]> {
-        Ok([directions::read(&self.store, "view")?, directions::read(&self.store, "light")?])
+        let read = |dimension: &str| -> Result<Vec<Direction>> {
+            let directions = directions::read(&self.store, dimension)?;
+            self.expect_direction_arrays(dimension, directions.len(), |name| name.ends_with("direction"))?;
+            Ok(directions)
+        };
+        Ok([read("view")?, read("light")?])
+    }
+
+    /// Checks the arrays of a dimension against the checksums that were kept; before the tile is done there are none.
+    fn expect_direction_arrays(
+        &self,
+        dimension: &str,
+        count: usize,
+        wanted: impl Fn(&str) -> bool,
+    ) -> Result<()> {
+        if self.has(Stage::Tile)? {
+            for (name, layout) in directions::layouts(dimension, count, self.store.format()) {
+                if wanted(&name) {
+                    self.open_array(Stage::Tile, &name, &layout)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the coordinates by which other programs select are the directions.
@@ -164,6 +186,7 @@ impl Model {
     pub(crate) fn check_coordinates(&self) -> Result<()> {
         for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
             directions::check_coordinates(&self.store, dimension, &directions)?;
+            self.expect_direction_arrays(dimension, directions.len(), |_| true)?;
         }
         Ok(())
     }

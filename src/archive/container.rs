@@ -1,6 +1,7 @@
 //! An archive in one file that computes or cuts out its images on demand.
 
 use std::ops::Range;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use btfkit_formats::npy::{self, Beside};
@@ -178,8 +179,20 @@ struct Container {
     path: PathBuf,
     file: MappedFile,
     images: Box<dyn Images>,
+    /// What the file was when it was opened.
+    opened: State,
     /// Files beside it that its samples depend on, those that are there.
     beside: Vec<PathBuf>,
+}
+
+/// By what a file is told from another one, or from itself after it was written to: device, number, size, times of the
+/// last change of its bytes and of anything else.
+type State = [i64; 7];
+
+fn state_of(path: &Path) -> Result<State> {
+    let data = std::fs::metadata(path).map_err(|error| Error::io("read", path, error))?;
+    let [device, number, size] = [data.dev(), data.ino(), data.size()].map(|value| value as i64);
+    Ok([device, number, size, data.mtime(), data.mtime_nsec(), data.ctime(), data.ctime_nsec()])
 }
 
 impl Container {
@@ -190,13 +203,26 @@ impl Container {
         open: impl FnOnce(&[u8]) -> btfkit_formats::Result<Box<dyn Images>>,
     ) -> Result<Self> {
         files::regular(path)?;
+        let opened = state_of(path)?;
         let file = MappedFile::open(path).map_err(|error| Error::io("read", path, error))?;
         let images = open(file.as_ref()).map_err(|error| {
             let asked = error.kind() == ErrorKind::Argument;
             let error = Error::from(error).context(path.display());
             if asked { error.hint(way_out) } else { error }
         })?;
-        Ok(Self { path: path.to_owned(), file, images, beside: Vec::new() })
+        Ok(Self { path: path.to_owned(), file, images, opened, beside: Vec::new() })
+    }
+
+    /// Checks that what was read is of the file that was opened: images of two would make one measurement.
+    ///
+    /// # Errors
+    /// Where it was written to or replaced meanwhile.
+    fn expect_unchanged(&self) -> Result<()> {
+        if state_of(&self.path)? == self.opened {
+            return Ok(());
+        }
+        Err(Error::input(format!("{}: the file was changed while it was read", self.path.display()))
+            .hint("begin again when nobody writes it any more"))
     }
 }
 
@@ -217,7 +243,9 @@ impl Source for Container {
         let samples = self.images.read_images(self.file.as_ref(), view, lights);
         // Pages that were read count as resident; the next group maps them again.
         self.file.release(0..self.file.as_ref().len());
-        samples.map_err(|error| Error::from(error).context(self.path.display()))
+        let samples = samples.map_err(|error| Error::from(error).context(self.path.display()))?;
+        self.expect_unchanged()?;
+        Ok(samples)
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {
@@ -225,6 +253,7 @@ impl Source for Container {
         for beside in self.beside.iter().filter(|beside| beside.is_file()) {
             digest = format!("{digest} {}", digest_of(beside, context)?);
         }
+        self.expect_unchanged()?;
         Ok(digest)
     }
 }

@@ -310,3 +310,41 @@ fn pictures_that_change_after_they_were_checked_are_refused() {
     std::fs::write(&names[0], &first).unwrap();
     assert_eq!(source.read_images(0, 0..2).unwrap(), before);
 }
+
+#[test]
+fn a_container_that_is_written_to_or_replaced_while_it_is_read_is_refused() {
+    use std::os::unix::fs::FileExt;
+    let folder = tempfile::tempdir().unwrap();
+    for (name, to) in [("m.npy", "npy"), ("m.btf", "dfmf")] {
+        let path = folder.path().join(name);
+        let source = || {
+            let paths = std::slice::from_ref(&path);
+            let options = btfkit::archive::Options::default();
+            btfkit::archive::open(paths, &options).unwrap()
+        };
+        let made = || {
+            let mut command = btf();
+            succeed(
+                command.arg("export").args([&fixture().measurement(), &path]).args(["--to", to, "--force"]),
+            );
+        };
+        let written = || {
+            let file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+            let last = file.metadata().unwrap().len() - 1;
+            file.write_all_at(b"x", last).unwrap();
+        };
+        let replaced = || {
+            let beside = folder.path().join("beside");
+            std::fs::copy(&path, &beside).unwrap();
+            std::fs::rename(&beside, &path).unwrap();
+        };
+        for change in [&written as &dyn Fn(), &replaced] {
+            made();
+            let archive = source();
+            archive.read_images(0, 0..1).unwrap();
+            change();
+            let error = archive.read_images(1, 0..1).unwrap_err();
+            assert!(error.to_string().contains("changed while it was read"), "{name}: {error}");
+        }
+    }
+}

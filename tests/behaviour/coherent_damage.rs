@@ -235,7 +235,14 @@ fn a_damaged_enlarged_index_is_refused() {
         let damage = |store: &Path| {
             change(&store.join("zarr.json"), &format!("/attributes/btfkit/{member}"), value.clone());
         };
-        refused(&big, damage, show("measured"), named);
+        // What claims to be a model is refused as such, and needs none beside it.
+        let plain = |store: &Path| {
+            let mut command = btf();
+            command.arg("image").arg(store).arg("--out").arg(store.with_extension("png"));
+            command
+        };
+        let command: &dyn Fn(&Path) -> Command = if member == "kind" { &plain } else { &show("measured") };
+        refused(&big, damage, command, named);
     }
     for (array, values) in [("index", "model"), ("source", "measured")] {
         let metadata = move |store: &Path| store.join(array).join("zarr.json");

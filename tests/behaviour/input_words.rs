@@ -173,6 +173,7 @@ fn a_folder_of_a_container_and_a_file_beside_it_say_what_to_name() {
     let said = fail(btf().arg("info").arg(&zip).args(["--pattern", "img_{theta_i}_{phi_i}.jpg"]), 65);
     assert!(said.contains("pattern") && !said.contains("name the file"), "{said}");
     assert!(!fail(btf().arg("info").arg(inner.join("none.zip")), 66).contains("name the file"));
+    std::fs::remove_file(&zip).unwrap();
     std::fs::write(inner.join("a.png"), png(9)).unwrap();
     assert!(!refused(&inner).contains("name the file"));
 }

@@ -249,18 +249,17 @@ impl Product {
 
 impl Description {
     /// What keeps btf-extractor 1.7 (and the viewers made of the same code) from opening a file with this
-    /// header, scalar type and largest rank: a sentence each, none if nothing does.
+    /// header, scalar type and largest rank: a clause each, none if nothing does.
     pub fn obstacles_elsewhere(&self, scalar: Scalar, rank: usize) -> Vec<String> {
         let mut list = Vec::new();
         let (views, lights, channels) = (self.views.len(), self.lights.len(), self.channels.len());
         if views != lights {
             list.push(format!(
-                "It takes the {} for the number of views, which is {views}.",
-                counted(lights, "light")
+                "it takes the number of lights ({lights}) for that of views, of which there are {views}"
             ));
         }
         if channels != 3 {
-            list.push(format!("It reads 3 channels only; there are {channels}."));
+            list.push(format!("it reads 3 channels only, and there are {channels}"));
         }
         let pixels = u64::from(self.width).saturating_mul(u64::from(self.height));
         let bytes = [lights, channels, rank, scalar.bytes()];
@@ -269,7 +268,7 @@ impl Description {
         let rows = pixels.max(lights.saturating_mul(lights));
         let bytes = [channels, rank, scalar].into_iter().fold(rows, u64::saturating_mul);
         if bytes > u64::from(u32::MAX) {
-            list.push(format!("It counts the {} of the larger matrices in 32 bits.", counted(bytes, "byte")));
+            list.push(format!("it counts bytes in 32 bits, and the larger matrices have {bytes}"));
         }
         list
     }

@@ -72,7 +72,10 @@ pub(super) fn fmf(measurement: &Measurement, options: &Options, context: &Contex
 
 /// What is not held, and what other programs will not like.
 fn notes(description: &bonn::Description, scalar: Scalar, rank: usize, size: Size) -> Vec<String> {
-    let mut notes = description.obstacles_elsewhere(scalar, rank);
+    let elsewhere = description.obstacles_elsewhere(scalar, rank).into_iter();
+    let mut notes: Vec<String> = elsewhere
+        .map(|obstacle| format!("the program btf-extractor cannot read this file: {obstacle}"))
+        .collect();
     if rank < size.full_rank() {
         notes.push(format!("not held: all but {} of {}", counted(rank, "component"), size.full_rank()));
     }

@@ -90,8 +90,11 @@ const MARKS: &str = "_- \t,;.:|=+()[]{}<>#@~&/\\\u{2013}\u{2014}\u{a0}";
 /// Of these, the ones that a unit may follow: `0.5_rad`, `0.5 (rad)`.
 const BEFORE_UNITS: [char; 7] = ['_', '-', ' ', '(', '[', '{', '<'];
 
-/// Of these, the ones that digits of their own may follow: a copy's number, `(2)`.
-const BEFORE_COUNTERS: &str = "([{<#@~";
+/// Of these, the ones that a whole number of its own may follow: that of a copy, `(2)`.
+const BRACKETS: [char; 4] = ['(', '[', '{', '<'];
+
+/// Of these, the ones that begin another word: `@2x`, `#3`, `~1`.
+const SIGNS: [char; 3] = ['#', '@', '~'];
 
 /// Of these, the ones that may separate numbers in a pattern.
 const BETWEEN_NUMBERS: &str = "_- \t=+()[]{}<>#@~&/\\";
@@ -145,13 +148,14 @@ fn is_part_of_number(text: &str) -> bool {
     is_other_unit(&word) || digits && IN_NUMBERS.contains(&word.as_str())
 }
 
-/// Whether a whole number stands right behind a bracket, as that of a copy does: `(2)`, but not `(+0.5)`.
+/// Whether a number is no part of the angle before it: a whole one right behind a bracket, as that of a copy is, `(2)`
+/// but not `(+0.5)`, or whatever stands behind a sign that only other words have, `@2x`.
 fn is_counter(marks: &str, next: &str) -> bool {
     let after = next.trim_start_matches(|c: char| c.is_ascii_digit());
     let fraction = |text: &str| text.starts_with(|c: char| c.is_numeric());
-    marks.ends_with(|c| BEFORE_COUNTERS.contains(c))
-        && !after.starts_with(|c: char| c.is_alphanumeric())
-        && !after.strip_prefix(['.', ',']).is_some_and(fraction)
+    let is_whole = !after.starts_with(|c: char| c.is_alphanumeric())
+        && !after.strip_prefix(['.', ',']).is_some_and(fraction);
+    marks.ends_with(SIGNS) || is_whole && marks.ends_with(BRACKETS)
 }
 
 /// The letters that a text begins with, small, and the rest.

@@ -90,23 +90,21 @@ impl Adaptation {
 /// A view to drop that there is none of, or no view left.
 pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn Source>> {
     let of = inner.contents();
-    let asked = reading.adaptation;
-    let overruled = |about: About| match about {
-        About::Azimuths => asked.mirrored.is_some() || asked.turn_deg != 0,
-        About::Cosine => asked.cosine_excluded && of.cosine_included,
-        About::Transfer => asked.transfer.is_some_and(|transfer| (transfer == Transfer::Linear) != of.linear),
-        About::Other => false,
-    };
-    let assumptions =
-        of.assumptions.iter().filter(|assumption| !overruled(assumption.about)).cloned().collect();
-    let adaptation = asked.effective(of);
+    let adaptation = reading.adaptation.effective(of);
     let reading = Reading { adaptation: adaptation.clone(), ..reading };
     let cosine = adaptation.cosine_excluded;
     let wanted = adaptation.samples.map_or(of.sample_type, SampleType::from);
     if reading == Reading::default() {
         return Ok(inner);
     }
-    let mut contents = Contents { assumptions, ..of.clone() };
+    let mut contents = of.clone();
+    // What an option says is no longer assumed.
+    contents.assumptions.retain(|assumption| match assumption.about {
+        About::Azimuths => adaptation.mirrored.is_none() && adaptation.turn_deg == 0,
+        About::Cosine => !(adaptation.cosine_excluded && of.cosine_included),
+        About::Transfer => adaptation.transfer.is_none(),
+        About::Other => true,
+    });
     let [mut views, mut lights] = [of.views.clone(), of.lights.clone()];
     if adaptation.swap {
         std::mem::swap(&mut views, &mut lights);

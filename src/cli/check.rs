@@ -12,7 +12,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::each::{Ended, Line, Outcome, each};
-use super::given::Given;
+use super::given::{Given, is_store};
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -74,7 +74,7 @@ impl Check {
     /// Examines one input, which may lie in pieces.
     fn examine(&self, paths: &[PathBuf], given: &Given, context: &Context<'_>) -> Result<Examined> {
         let path = first(paths);
-        if path.join("zarr.json").exists() || path.extension().is_some_and(|e| e == "zarr") {
+        if is_store(path) {
             given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;

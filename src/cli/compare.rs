@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
@@ -12,8 +12,8 @@ use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 
-use super::Console;
 use super::table::{row, table};
+use super::{Console, as_json};
 
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
@@ -47,7 +47,7 @@ impl Compare {
         let (model, measurement) = compare::open(&options)?;
         let report = compare::run(&model, &measurement, context)?;
         if self.json {
-            let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
+            let value = as_json(&report)?;
             console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::method::cluster::centre::CentreRule;
 use btfkit::method::cluster::lloyd::Limits;
 use btfkit::picture::Ending;
@@ -10,7 +10,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::table::{row, table};
-use super::{Console, bytes_text};
+use super::{Console, as_json, bytes_text};
 
 /// Show the error and the compression that 1, 2, 4, 8 ... clusters would give
 #[derive(Args)]
@@ -55,7 +55,7 @@ impl Curve {
         })?;
         let curve = plan.run(context)?;
         if self.json {
-            let value = serde_json::to_value(&curve).map_err(|error| Error::internal(error.to_string()))?;
+            let value = as_json(&curve)?;
             console.plan(&value)?;
         } else {
             print_curve(&curve, console);

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use btfkit::error::{Error, Result};
+use btfkit::error::Result;
 use btfkit::picture::deepzoom::Encoding;
 use btfkit::run::Context;
 use btfkit::stage::deepzoom;
@@ -8,9 +8,9 @@ use btfkit::stage::image::Subject;
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::Console;
 use super::given::Given;
 use super::scene::SceneArgs;
+use super::{Console, as_json};
 
 /// JPEG quality of tiles, unless one is given.
 const QUALITY: u8 = 90;
@@ -92,7 +92,7 @@ impl Deepzoom {
         }
         let report = plan.run(context)?;
         if self.json {
-            let value = serde_json::to_value(&report).map_err(|error| Error::internal(error.to_string()))?;
+            let value = as_json(&report)?;
             return console.plan(&value);
         }
         let [width, height] = report.size;

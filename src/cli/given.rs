@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
-use btfkit::store::{enlarged, measurement, model};
-use btfkit::zarr::Store;
+use btfkit::store;
 use clap::parser::ValueSource;
-use serde_json::Value;
 
 use super::help;
 use super::source::SourceArgs;
@@ -67,8 +65,10 @@ impl Given {
 
 /// The kind of the store at a path, where a whole one of ours lies there.
 pub(super) fn kind_at(path: &Path) -> Option<&'static str> {
-    const KINDS: [&str; 3] = [measurement::KIND, model::KIND, enlarged::KIND];
-    let attributes = Store::at(path).expect_one_of(&KINDS).ok()?;
-    let kind = attributes.get("kind").and_then(Value::as_str)?;
-    KINDS.into_iter().find(|known| *known == kind)
+    store::kind_of(path).ok()
+}
+
+/// Whether a path is that of a store, made or to be made.
+pub(super) fn is_store(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending == "zarr") || path.join("zarr.json").exists()
 }

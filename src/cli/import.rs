@@ -13,7 +13,7 @@ use btfkit_formats::SampleType;
 use clap::Args;
 
 use super::each::{Ended, Line, each};
-use super::given::kind_at;
+use super::given::{is_store, kind_at};
 use super::outputs::wanted_twice;
 use super::source::SourceArgs;
 use super::{Console, bytes_text, number};
@@ -212,11 +212,6 @@ impl Import {
 /// Whether samples of a type can be above white.
 fn holds_highlights(samples: SampleType) -> bool {
     matches!(samples, SampleType::F16 | SampleType::F32)
-}
-
-/// Whether a path is that of a store, made or to be made.
-fn is_store(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e == "zarr") || path.join("zarr.json").exists()
 }
 
 fn summary(description: &Description, report: &Report) -> String {

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use serde::Serialize;
-use serde_json::Value;
 
 use crate::error::Result;
 use crate::stage::enlarge::blocks_done;
 use crate::store::enlarged::{self, Enlarged};
+use crate::store::kind_of;
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
-use crate::zarr::Store;
 use crate::zarr::metadata::OLDEST_FORMAT;
 
 /// How much of a store is there.
@@ -65,9 +64,8 @@ impl Status {
 /// # Errors
 /// Where there is none of these, or its attributes are damaged.
 pub fn of(path: &Path) -> Result<Status> {
-    let attributes = Store::at(path).expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
-    match attributes.get("kind").and_then(Value::as_str) {
-        Some(model::KIND) => {
+    match kind_of(path)? {
+        model::KIND => {
             let model = Model::open(path)?;
             let mut done = Vec::new();
             for (number, stage) in Stage::ALL.into_iter().enumerate() {
@@ -77,7 +75,7 @@ pub fn of(path: &Path) -> Result<Status> {
             }
             Ok(Status::new(model::KIND, "stage", Stage::ALL.len(), done, true))
         }
-        Some(enlarged::KIND) => {
+        enlarged::KIND => {
             let enlarged = Enlarged::open(path)?;
             let (units, done) = blocks_done(&enlarged);
             let finished = enlarged.is_finished()? || enlarged.format() == OLDEST_FORMAT;

@@ -21,6 +21,20 @@ use crate::run::recipe::{self, Made};
 use crate::run::{Context, Existing};
 use crate::zarr::{FORMAT, Store, metadata};
 
+/// The kinds of store that a user names.
+const KINDS: [&str; 3] = [measurement::KIND, model::KIND, enlarged::KIND];
+
+/// Which kind of store lies at a path.
+///
+/// # Errors
+/// As [`Store::expect`], where there is none of them.
+pub fn kind_of(path: &Path) -> Result<&'static str> {
+    let attributes = Store::at(path).expect_one_of(&KINDS)?;
+    let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
+    let known = KINDS.into_iter().find(|known| *known == kind);
+    known.ok_or_else(|| Error::internal(format!("{}: a store of kind {kind:?}", path.display())))
+}
+
 /// Whether a file of a store that a recipe makes is one that this program writes, by its way from the root.
 fn is_own(path: &Path) -> bool {
     const ARRAYS: [&str; 14] = [

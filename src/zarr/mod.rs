@@ -43,12 +43,16 @@ pub(crate) fn data_type_of(sample_type: SampleType) -> DataType {
 }
 
 /// The types that samples come in.
-pub(crate) const SAMPLE_TYPES: [SampleType; 4] =
-    [SampleType::U8, SampleType::U16, SampleType::F16, SampleType::F32];
+const SAMPLE_TYPES: [SampleType; 4] = [SampleType::U8, SampleType::U16, SampleType::F16, SampleType::F32];
 
 /// The type of samples that is this Zarr data type, if one is.
 pub(crate) fn sample_type_of(data_type: &DataType) -> Option<SampleType> {
     SAMPLE_TYPES.into_iter().find(|&sample_type| data_type_of(sample_type) == *data_type)
+}
+
+/// The type of samples of this name, if one has it.
+pub(crate) fn samples_named(name: &str) -> Option<SampleType> {
+    SAMPLE_TYPES.into_iter().find(|samples| samples.name() == name)
 }
 
 /// A Zarr v3 group in a directory.

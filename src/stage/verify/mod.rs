@@ -9,16 +9,15 @@ pub(crate) mod report;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::Value;
 
 use crate::archive::Source;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::stage::deepzoom;
+use crate::store::kind_of;
 use crate::store::measurement::Measurement;
 use crate::store::model::Model;
 use crate::store::{enlarged as index, measurement as measured, model as modelled, recognise};
-use crate::zarr::Store;
 pub use report::{Finding, Report};
 
 /// What was found of anything that can be verified.
@@ -53,14 +52,7 @@ pub struct Beside<'a> {
 /// and those of the operating system. What else is damaged is reported.
 pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Found> {
     recognise::expect_readable(path)?;
-    let kind = if is_pyramid(path) {
-        None
-    } else {
-        let kinds = [measured::KIND, modelled::KIND, index::KIND];
-        let attributes = Store::at(path).expect_one_of(&kinds)?;
-        attributes.get("kind").and_then(Value::as_str).map(str::to_owned)
-    };
-    let kind = kind.as_deref();
+    let kind = if is_pyramid(path) { None } else { Some(kind_of(path)?) };
     let refused = |what: &str| Error::usage(format!("{}: {what}", path.display()));
     if beside.source.is_some() && kind != Some(measured::KIND) {
         return Err(refused("only a measurement can be compared with an archive"));

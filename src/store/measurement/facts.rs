@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::run::recipe::Recipe;
 use crate::zarr::codec::{Chain, MOST_CHANNELS};
 use crate::zarr::metadata::shown;
-use crate::zarr::{SAMPLE_TYPES, Store};
+use crate::zarr::{Store, samples_named};
 
 /// What a measurement depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -139,11 +139,10 @@ impl Facts {
     /// Type of the samples.
     pub(super) fn sample_type(&self, store: &Store) -> Result<SampleType> {
         let found = match &self.samples {
-            Some(name) => SAMPLE_TYPES.into_iter().find(|samples| samples.name() == name),
+            Some(name) => samples_named(name),
             None => {
                 let document = store.array_document("reflectance")?;
-                let name = document.get("data_type").and_then(Value::as_str).unwrap_or_default().to_owned();
-                SAMPLE_TYPES.into_iter().find(|samples| samples.name() == name)
+                samples_named(document.get("data_type").and_then(Value::as_str).unwrap_or_default())
             }
         };
         found.ok_or_else(|| {

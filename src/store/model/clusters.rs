@@ -17,7 +17,7 @@ use crate::method::cluster::search::Trial;
 use crate::run::recipe::Recipe;
 use crate::shape::Size;
 use crate::store::clustering::BatchPass;
-use crate::zarr::{Layout, SAMPLE_TYPES, data_type_of};
+use crate::zarr::{Layout, data_type_of, samples_named};
 
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;
@@ -284,7 +284,7 @@ impl Model {
         let names = document.get("attributes").and_then(|attributes| attributes.get("channels"));
         let names = serde_json::from_value(names.cloned().unwrap_or_default());
         let name = document.get("data_type").and_then(Value::as_str).unwrap_or_default();
-        let samples = SAMPLE_TYPES.into_iter().find(|samples| samples.name() == name);
+        let samples = samples_named(name);
         names
             .ok()
             .zip(samples)

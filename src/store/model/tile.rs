@@ -14,7 +14,7 @@ use crate::run::recipe::Recipe;
 use crate::shape::Size;
 use crate::store::directions;
 use crate::store::measurement::Description;
-use crate::zarr::{Layout, SAMPLE_TYPES};
+use crate::zarr::{Layout, samples_named};
 
 /// Longest side of a plane.
 const MOST_SIDE: usize = 1 << 24;
@@ -79,8 +79,7 @@ impl TileReport {
 
     /// Names of the channels and type of the samples, where they are known.
     pub(super) fn values(&self) -> Option<(Vec<String>, SampleType)> {
-        let samples =
-            SAMPLE_TYPES.into_iter().find(|samples| self.samples.as_deref() == Some(samples.name()))?;
+        let samples = samples_named(self.samples.as_deref()?)?;
         Some((self.channels.clone()?, samples))
     }
 

@@ -31,6 +31,7 @@ mod table;
 mod terminal;
 mod tile;
 mod verify;
+mod view;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -133,6 +134,7 @@ enum Command {
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    View(view::View),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
@@ -306,6 +308,7 @@ impl Command {
             Self::Appearance(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
+            Self::View(command) => command.run(context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
             Self::Man(command) => command.run(console),

@@ -117,6 +117,18 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "view",
+        base: &["{model}", "--export", "{new}/p.html"],
+        options: &[
+            ("source", ITSELF),
+            ("export", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("window", Unseen("of enlargements; viewer.rs tries it")),
+            ("port", Unseen("of the server; viewer.rs tries it")),
+            ("open", Unseen("starts a browser")),
+        ],
+    },
+    Outputs {
         command: "status",
         base: &["{measurement}"],
         options: &[("stores", ITSELF), ("json", Shows(&["--json"], &[]))],

@@ -84,3 +84,5 @@ mod shares;
 mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;
+#[path = "behaviour/viewer.rs"]
+mod viewer;

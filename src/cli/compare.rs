@@ -8,10 +8,12 @@ use btfkit::shape::Size;
 use btfkit::stage::{compare, image};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
+use btfkit::store::{measurement, model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
 
+use super::given::expect_in_order;
 use super::table::{row, table};
 use super::{Console, as_json};
 
@@ -42,6 +44,10 @@ pub(super) struct Compare {
 
 impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.model, &[model::KIND]), (&self.measurement, &[measurement::KIND])],
+            &format!("btf compare {} {}", self.measurement.display(), self.model.display()),
+        )?;
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
@@ -69,8 +75,11 @@ impl Compare {
             if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
-                     texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
-                    report.all.ciede2000, report.all.lightness
+                     texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
+                    report.all.ciede2000,
+                    report.all.lightness,
+                    self.measurement.display(),
+                    self.model.display()
                 ));
             }
             if report.all.samples_left_out > 0 {

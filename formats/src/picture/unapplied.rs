@@ -17,7 +17,8 @@ const NAMES: [(&str, &[&str]); 13] = [
     ("significantbits", &[]),
     ("sminsamplevalue", &[]),
     ("smaxsamplevalue", &[]),
-    ("calibrationfunction", &["none", "0", "20"]),
+    // The number of none in ImageJ; 0 is a straight line.
+    ("calibrationfunction", &["20"]),
     ("brightness", &["0", "0.0"]),
 ];
 

@@ -330,7 +330,7 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
     };
     let has_number = |number: usize| {
         let name = name(number);
-        name.rsplit_once('.').map_or(name, |(stem, _)| stem).contains(|c: char| c.is_ascii_digit())
+        name.rsplit_once('.').map_or(name, |(stem, _)| stem).contains(|c: char| c.is_numeric())
     };
     if let Some(&plain) = pictures.iter().find(|&&number| !has_number(number))
         && pictures.len() > 1

@@ -355,9 +355,6 @@ fn stores_in_each_others_place_are_told_with_the_command_that_was_meant() {
         let meant = format!("btf {command} {} {}", measurement.display(), model.display());
         assert!(told.contains("the other way round") && told.contains(&meant), "{told}");
     }
-    let told = fail(&mut run(&["compare"], &[&measurement, &model], &[]), 2);
-    let meant = format!("btf compare {} {}", model.display(), measurement.display());
-    assert!(told.contains(&meant), "{told}");
     for subject in [&model, &enlarged] {
         let told = fail(&mut run(&["judge"], &[&measurement, Path::new("--against"), subject], &[]), 2);
         let meant = format!("btf judge {} --against {}", subject.display(), measurement.display());

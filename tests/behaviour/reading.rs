@@ -341,7 +341,7 @@ fn lights_without_names_need_pictures_whose_order_is_plain() {
         let (code, text) = told(names);
         assert!(code == 65 && text.contains(words) && text.contains("put the names"), "{names:?}: {text}");
     }
-    for names in [["1.jpg", "2.jpg", "10.jpg"], ["IMG_0001.jpg", "img_0002.jpg", "IMG_0003.jpg"]] {
+    for names in [["1.jpg", "2.jpg", "10.jpg"], ["IMG_0001.jpg", "IMG_0002.jpg", "img_0003.jpg"]] {
         let (code, text) = told(names);
         assert!(code == 0 && text.contains("in the order of the numbers"), "{names:?}: {text}");
     }

@@ -283,6 +283,7 @@ impl Command {
         match self {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
+            Self::Compare(command) => command.goes_on(),
             _ => false,
         }
     }

@@ -116,10 +116,11 @@ fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
     if options.pyramids {
         add(
             "deepzoom.sh",
-            "Makes a Deep Zoom pyramid of an enlargement.",
-            "run export \"${deepzoom_options[@]}\" \"${planes[material]}\" \"${pyramids[material]}\" --deepzoom",
-            1,
-            None,
+            "Makes a Deep Zoom pyramid of an enlargement, or one part of its tiles.",
+            "run export \"${deepzoom_options[@]}\" \"${planes[material]}\" \"${pyramids[material]}\" --deepzoom \
+             --shard \"$part/$deepzoom_parts\"",
+            options.parts,
+            Some("deepzoom_parts"),
             needs.pyramid,
         );
     }
@@ -182,6 +183,9 @@ fn settings(options: &Options, materials: &[Material]) -> Vec<u8> {
     let mut parts = number("import_parts", options.parts);
     if options.surface.as_ref().is_some_and(|surface| surface.in_parts) {
         parts.extend(number("enlarge_parts", options.parts));
+    }
+    if options.pyramids {
+        parts.extend(number("deepzoom_parts", options.parts));
     }
     if options.cluster_parts > 1 {
         parts.extend(number("cluster_parts", options.cluster_parts));

@@ -177,3 +177,62 @@ fn what_cannot_be_reached_is_said() {
     let all = pack(&given, 0.0, Target::Bytes(1 << 30)).unwrap();
     assert!(all.decibels > 60.0 && all.bytes.len() < 40_000, "{} {}", all.decibels, all.bytes.len());
 }
+
+/// A model of whole numbers alone, the same on every machine.
+fn fixture() -> Model {
+    let direction = |theta: u32, phi: u32| Direction { theta_deg: theta.into(), phi_deg: phi.into() };
+    let views =
+        [(0, 0), (30, 0), (30, 90), (30, 180), (30, 270), (60, 45)].map(|(t, p)| direction(t, p)).to_vec();
+    let lights = [(15, 0), (15, 120), (15, 240), (45, 10), (45, 190)].map(|(t, p)| direction(t, p)).to_vec();
+    let brdf = views.len() * lights.len() * 3;
+    let mixed = |n: usize, k: usize| f64::from((n * n * (k + 3) + 31 * n + 7 * k) as u32 % 97) - 48.0;
+    let components = (0..4).map(|k| {
+        let basis: Vec<f64> = (0..brdf).map(|n| mixed(n / (4 - k), k)).collect();
+        let length = basis.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let strength = f64::from(100u32 >> k);
+        let texel = |n: usize| strength * (mixed(n / 14, k) + mixed(n % 14 / 3, k + 5)) / 8.0;
+        Component {
+            basis: basis.iter().map(|v| v / length).collect(),
+            coefficients: (0..10 * 14).map(texel).collect(),
+        }
+    });
+    Model {
+        size: [10, 14],
+        wraps: true,
+        components: components.collect(),
+        mean: (0..brdf).map(|n| 100.0 + mixed(n / 3, 1) + (n % 3) as f64).collect(),
+        views,
+        lights,
+        channels: ["R", "G", "B"].map(String::from).to_vec(),
+        texts: vec![("licence".to_owned(), "CC0-1.0".to_owned()), ("samples".to_owned(), "uint8".to_owned())],
+    }
+}
+
+/// What the fixture unpacks to, as other decoders compare it: mean, bases, coefficients.
+fn numbers(model: &Model) -> Vec<f64> {
+    let parts = model.components.iter().flat_map(|part| part.basis.iter().chain(&part.coefficients));
+    model.mean.iter().chain(parts).copied().collect()
+}
+
+/// The format is frozen: what this version writes, others must read, and the other way round. Written anew with
+/// BTFKIT_WRITE_FIXTURES=1, for a new version of the format.
+#[test]
+fn the_fixture_is_what_is_written_and_reads_as_it_did() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let (file, values) = (folder.join("small.btfc"), folder.join("small.f64"));
+    let packed = pack(&fixture(), 0.0, Target::Decibels(32.0)).unwrap();
+    if std::env::var_os("BTFKIT_WRITE_FIXTURES").is_some() {
+        let found = numbers(&unpack(&packed.bytes).unwrap().model);
+        std::fs::write(&values, found.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()).unwrap();
+        std::fs::write(&file, &packed.bytes).unwrap();
+    }
+    let written = std::fs::read(&file).unwrap();
+    assert!(written == packed.bytes, "the bytes that are written have changed");
+    let found = numbers(&unpack(&written).unwrap().model);
+    let expected = std::fs::read(&values).unwrap();
+    assert_eq!(8 * found.len(), expected.len());
+    let (expected, _) = expected.as_chunks::<8>();
+    assert!(
+        found.iter().zip(expected).all(|(found, bytes)| (found - f64::from_le_bytes(*bytes)).abs() < 1e-9)
+    );
+}

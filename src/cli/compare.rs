@@ -5,12 +5,13 @@ use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::shape::Size;
+use btfkit::stage::compare::By;
 use btfkit::stage::{compare, image};
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::Model;
 use btfkit::words::counted;
 use btfkit_formats::Direction;
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -35,9 +36,20 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
+    /// What of the model is compared [default: clusters, if it has them]
+    #[arg(long, value_enum)]
+    by: Option<ByName>,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ByName {
+    /// Its clusters
+    Clusters,
+    /// Its components
+    Components,
 }
 
 impl Compare {
@@ -45,7 +57,12 @@ impl Compare {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
-        let report = compare::run(&model, &measurement, context)?;
+        let by = match self.by {
+            Some(ByName::Clusters) => By::Clusters,
+            Some(ByName::Components) => By::Components,
+            None => By::of(&model)?,
+        };
+        let report = compare::run(&model, &measurement, by, context)?;
         if self.json {
             let value = as_json(&report)?;
             console.plan(&value)?;
@@ -66,7 +83,9 @@ impl Compare {
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
-            if report.all.hues_are_lost() {
+            if by == By::Components {
+                console.line("by the components of the model");
+            } else if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
@@ -80,7 +99,7 @@ impl Compare {
         }
         match &self.picture {
             Some(path) => {
-                self.side_by_side(&model, &measurement, context)?.write(path, context.existing)?;
+                self.side_by_side(&model, &measurement, by, context)?.write(path, context.existing)?;
                 if !self.json {
                     let description = measurement.description();
                     let measured = [&description.views[..], &description.lights];
@@ -96,12 +115,18 @@ impl Compare {
         &self,
         model: &Model,
         measurement: &Measurement,
+        by: By,
         context: &Context<'_>,
     ) -> Result<Picture> {
         let tile = model.tile()?;
         let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
-        let colors = image::cluster_colors(model, self.view, self.light)?;
-        let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
+        let modelled = match by {
+            By::Clusters => {
+                let colors = image::cluster_colors(model, self.view, self.light)?;
+                image::look_up(tile.size, &model.index()?, &colors)?
+            }
+            By::Components => image::of_components(model, self.view, self.light, context)?,
+        };
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]

@@ -1,16 +1,20 @@
-//! Model against measurement: how well the tile is reconstructed from its index and representatives.
+//! Model against measurement: how well the tile is reconstructed from its index and representatives, or from its
+//! components.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
+use btfkit_formats::Samples;
 use serde::Serialize;
 
 use crate::color::{ciede2000, lab};
 use crate::error::Result;
+use crate::method::value::components::Components;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::image::of_stage;
-use crate::store::measurement::Measurement;
+use crate::store::measurement::{Description, Measurement};
 use crate::store::model::{Model, Stage};
 
 /// Texels whose colour differences are taken; the other figures count every texel.
@@ -29,6 +33,63 @@ pub struct Options {
     pub model: PathBuf,
     /// The measurement that it was made from.
     pub measurement: PathBuf,
+}
+
+/// What of a model is compared: each gives the tile's samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum By {
+    /// Index and representatives of the clusters.
+    Clusters,
+    /// The components.
+    Components,
+}
+
+impl By {
+    /// What a model has, clusters if it has both.
+    ///
+    /// # Errors
+    /// Those of reading the model's attributes.
+    pub fn of(model: &Model) -> Result<Self> {
+        let only_components = !model.has(Stage::Cluster)? && model.has(Stage::Components)?;
+        Ok(if only_components { Self::Components } else { Self::Clusters })
+    }
+}
+
+/// The tile's samples as a model has them.
+enum Modelled {
+    Clusters { index: Vec<u16>, samples: Samples },
+    Components(Components),
+}
+
+impl Modelled {
+    fn open(model: &Model, by: By, context: &Context<'_>) -> Result<Self> {
+        Ok(match by {
+            By::Clusters => Self::Clusters {
+                index: of_stage(model, Stage::Cluster, Model::index)?,
+                samples: of_stage(model, Stage::Cluster, Model::representatives)?.samples,
+            },
+            By::Components => Self::Components(of_stage(model, Stage::Components, |model| {
+                context.require("comparing components", model.components_bytes()?)?;
+                model.components()
+            })?),
+        })
+    }
+
+    /// Samples that hold those of all texels under a view, and where each texel's begin.
+    fn of_view(&self, view: usize, description: &Description) -> (Cow<'_, Samples>, Vec<usize>) {
+        let texel = description.texel_samples();
+        match self {
+            Self::Clusters { index, samples } => {
+                let start = |&cluster: &u16| (usize::from(cluster) * description.views.len() + view) * texel;
+                (Cow::Borrowed(samples), index.iter().map(start).collect())
+            }
+            Self::Components(components) => {
+                let samples = components.samples_of_view(view, description.sample_type, description.transfer);
+                (Cow::Owned(samples), (0..components.size.texels()).map(|number| number * texel).collect())
+            }
+        }
+    }
 }
 
 /// Errors of the reconstructed tile.
@@ -181,10 +242,9 @@ pub fn open(options: &Options) -> Result<(Model, Measurement)> {
 ///
 /// # Errors
 /// Those of reading, and too little memory.
-pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> Result<Report> {
+pub fn run(model: &Model, measurement: &Measurement, by: By, context: &Context<'_>) -> Result<Report> {
     let description = measurement.description();
-    let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
-    let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
+    let (tile, modelled) = (model.tile()?, Modelled::open(model, by, context)?);
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
     let (texel, channels) = (description.texel_samples(), description.n_channels());
     let decoder = description.decoder()?;
@@ -193,21 +253,26 @@ pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> R
 
     let views: Vec<usize> = (0..description.views.len()).collect();
     context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
-    let window_bytes = 2 * (bounds.size.texels() * description.texel_bytes()) as u64;
+    // Of components, samples of the view are made, and the values that they are rounded from.
+    let made = match by {
+        By::Clusters => 0,
+        By::Components => description.texel_bytes() + description.texel_samples() * size_of::<f32>(),
+    };
+    let window_bytes = (bounds.size.texels() * (2 * description.texel_bytes() + made)) as u64;
     let in_flight = units::in_flight(context, &format!("comparing views of {}", bounds.size), window_bytes)?;
     let sums = units::for_each(context, &views, in_flight, |&view| {
         let window = measurement.read_reflectance(view, bounds)?;
+        let (model_samples, starts) = modelled.of_view(view, description);
         let mut sums = Sums { views: 1, ..Sums::default() };
         let difference = |measured: usize, modelled: usize| {
-            let [a, b] = [window.value(measured), representatives.samples.value(modelled)];
+            let [a, b] = [window.value(measured), model_samples.value(modelled)];
             Some(a? - b?).filter(|difference| difference.is_finite())
         };
-        for (number, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
-            let start = (usize::from(cluster) * description.views.len() + view) * texel;
+        for (number, (&at, &start)) in offsets.iter().zip(&starts).enumerate() {
             for sample in (0..texel).step_by(channels) {
                 let (measured, modelled) = (at * texel + sample, start + sample);
                 let code = codes.code(&window, measured);
-                sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
+                sums.codes += u64::from(code.abs_diff(codes.code(&model_samples, modelled)));
                 for channel in 0..channels {
                     match difference(measured + channel, modelled + channel) {
                         Some(difference) => sums.squares += difference * difference,
@@ -215,8 +280,7 @@ pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> R
                     }
                 }
                 if number % stride == 0 {
-                    let [a, b] =
-                        [decoder.rgb(&window, measured), decoder.rgb(&representatives.samples, modelled)];
+                    let [a, b] = [decoder.rgb(&window, measured), decoder.rgb(&model_samples, modelled)];
                     sums.add_colour(ciede2000(lab(a), lab(b)));
                 }
             }

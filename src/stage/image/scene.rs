@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::{
     Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, expect_colors, look_up, mixed,
-    notes_of_directions, of_measured_tile,
+    notes_of_directions, of_components, of_measured_tile,
 };
 use crate::color::Decoder;
 use crate::error::{Error, ErrorKind, Result};
@@ -392,7 +392,21 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened>
 fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let tile = tile_picture(model, options, context)?;
     let size = tile.size;
-    Ok(Opened { source: Source::Tile(tile), size, directions: of_model(model, options)? })
+    let mut directions = of_model(model, options)?;
+    let is_lit = matches!(options.subject, Subject::Appearance { .. });
+    if options.values == Values::Model && is_lit && by_components(model, &options.values)? {
+        directions.push("the model has no clusters: values are those of its components".to_owned());
+    }
+    Ok(Opened { source: Source::Tile(tile), size, directions })
+}
+
+/// Whether values come from the components: where they are asked for, and where there are no clusters.
+fn by_components(model: &Model, values: &Values) -> Result<bool> {
+    Ok(match values {
+        Values::Components => true,
+        Values::Model => !model.has(Stage::Cluster)? && model.has(Stage::Components)?,
+        Values::Measured(_) => false,
+    })
 }
 
 /// What is to be said of the directions of a picture of a model.
@@ -406,7 +420,10 @@ fn of_model(model: &Model, options: &Options) -> Result<Vec<String>> {
 fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Result<Picture> {
     let tile = model.tile()?;
     match (options.subject, &options.values) {
-        (Subject::Appearance { view, light }, Values::Model) => {
+        (Subject::Appearance { view, light }, values) if by_components(model, values)? => {
+            of_components(model, view, light, context)
+        }
+        (Subject::Appearance { view, light }, Values::Model | Values::Components) => {
             let colors = of_stage(model, Stage::Cluster, |model| cluster_colors(model, view, light))?;
             look_up(tile.size, &of_stage(model, Stage::Cluster, Model::index)?, &colors)
         }
@@ -479,7 +496,11 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         "seed": variation.seed,
         "jitter": variation.jitter,
         "window": [area.x, area.y, area.size.width, area.size.height],
-        "values": if options.values == Values::Model { "model" } else { "measured" },
+        "values": match options.values {
+            Values::Model => "model",
+            Values::Components => "components",
+            Values::Measured(_) => "measured",
+        },
     });
     Ok(Scene {
         source: Source::Plane { plane, variation, tile },

@@ -364,7 +364,7 @@ impl Console {
     /// The first line of what is told of a stage.
     fn stage(self, label: &str, text: &str) {
         let found = if self.found { "found done: " } else { "" };
-        self.line(format!("{label:<10}{found}{text}"));
+        self.line(format!("{label:<9} {found}{text}"));
     }
 
     /// One line. Whatever it names cannot end it, or change what the terminal shows.

@@ -82,6 +82,8 @@ struct Opened {
     size: Size,
     /// As in a [`Scene`].
     directions: Vec<String>,
+    /// Digest of the components, where they were asked for.
+    components: Option<String>,
 }
 
 /// Pixels of some rows; looked up row by row, since numbers take less memory.
@@ -161,11 +163,11 @@ impl Scene {
                 path.display()
             )));
         }
-        let (Opened { source, size, directions }, digest) = match (kind, options.plane) {
+        let (Opened { source, size, directions, components }, digest) = match (kind, options.plane) {
             (measurement::KIND, _) => (of_measurement(Measurement::open(path)?, options)?, digest),
             (model::KIND, None) => {
                 let model = Model::open(path)?;
-                (of_tile(&model, options, context)?, model.stage_digest(Stage::Cluster)?)
+                (of_tile(&model, options, context)?, shown_digest(&model, options)?)
             }
             (model::KIND, Some(plane)) => return of_plane(&Model::open(path)?, options, plane, context),
             (enlarged::KIND, _) => (of_enlarged(Enlarged::open(path)?, options, context)?, digest),
@@ -190,8 +192,10 @@ impl Scene {
         if area != whole {
             recipe["window"] = json!([area.x, area.y, area.size.width, area.size.height]);
         }
-        if options.values != Values::Model {
-            recipe["values"] = json!("measured");
+        match &options.values {
+            Values::Model => {}
+            Values::Measured(_) => recipe["values"] = json!("measured"),
+            Values::Components => recipe["values"] = json!({"components": components}),
         }
         let incomplete = source.incomplete(path);
         Ok(Self { source, area, recipe, beyond: Beyond::default(), directions, incomplete })
@@ -386,7 +390,12 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened>
     let (size, decoder) = (description.size, description.decoder()?);
     let directions = notes_of_directions([&description.views, &description.lights], view, light);
     let appearance = super::measured_appearance(&measurement, view, light);
-    Ok(Opened { source: Source::Measurement { measurement, appearance, decoder }, size, directions })
+    Ok(Opened {
+        source: Source::Measurement { measurement, appearance, decoder },
+        size,
+        directions,
+        components: None,
+    })
 }
 
 fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Opened> {
@@ -397,7 +406,21 @@ fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Op
     if options.values == Values::Model && is_lit && by_components(model, &options.values)? {
         directions.push("the model has no clusters: values are those of its components".to_owned());
     }
-    Ok(Opened { source: Source::Tile(tile), size, directions })
+    Ok(Opened { source: Source::Tile(tile), size, directions, components: components_of(model, options)? })
+}
+
+/// Digest of a model's components, where values are theirs by option.
+fn components_of(model: &Model, options: &Options) -> Result<Option<String>> {
+    let wanted = options.values == Values::Components;
+    wanted.then(|| model.stage_digest(Stage::Components)).transpose()
+}
+
+/// Digest of the stage of a model that a picture of its tile shows.
+fn shown_digest(model: &Model, options: &Options) -> Result<String> {
+    let is_lit = matches!(options.subject, Subject::Appearance { .. });
+    let stage =
+        if is_lit && by_components(model, &options.values)? { Stage::Components } else { Stage::Cluster };
+    model.stage_digest(stage)
 }
 
 /// Whether values come from the components: where they are asked for, and where there are no clusters.
@@ -490,7 +513,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
-    let recipe = json!({
+    let mut recipe = json!({
         "kind": "plane",
         "digest": model.digest_of(enlarged::Method::Coherent.stages())?,
         "seed": variation.seed,
@@ -502,6 +525,9 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
             Values::Measured(_) => "measured",
         },
     });
+    if let Some(components) = components_of(model, options)? {
+        recipe["components"] = json!(components);
+    }
     Ok(Scene {
         source: Source::Plane { plane, variation, tile },
         area,
@@ -514,7 +540,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let size = enlarged.size();
-    let mut directions = Vec::new();
+    let (mut directions, mut components) = (Vec::new(), None);
     let source = match options.subject {
         Subject::Appearance { view, light } if options.values == Values::Model => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
@@ -527,6 +553,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
             let tile = tile_picture(&model, options, context)?;
+            components = components_of(&model, options)?;
             directions = of_model(&model, options)?;
             Source::Sources { enlarged, tile }
         }
@@ -542,7 +569,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
             .hint("enlarge by another --method than paper, without --no-source"));
         }
     };
-    Ok(Opened { source, size, directions })
+    Ok(Opened { source, size, directions, components })
 }
 
 /// The model that an enlarged index at a path refers to; where it is not named, it is looked for where it lay when the

@@ -7,8 +7,9 @@ use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::compare::By;
 use btfkit::stage::{compare, image};
+use btfkit::store;
 use btfkit::store::measurement::Measurement;
-use btfkit::store::model::Model;
+use btfkit::store::model::{self, Model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
@@ -20,12 +21,12 @@ use super::{Console, as_json};
 #[derive(Args)]
 #[command(after_help = "\
 Example:
-  btf compare wood.model.zarr wood.zarr --picture side.png --light 15,0 --view 0,0")]
+  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0")]
 pub(super) struct Compare {
-    /// The model
-    model: PathBuf,
     /// The measurement
     measurement: PathBuf,
+    /// The model; the two may also come the other way round
+    model: PathBuf,
     /// Also write a picture of the measured tile, the model's tile, and four times their difference: .png, .jpg, .webp
     /// or .tif
     #[arg(long, value_name = "FILE")]
@@ -55,7 +56,11 @@ enum ByName {
 impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
-        let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
+        // Both are read, so what they are tells which is which.
+        let named = [&self.measurement, &self.model];
+        let swapped = store::kind_of(named[0]).is_ok_and(|kind| kind == model::KIND);
+        let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
+        let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
         let by = match self.by {
             Some(ByName::Clusters) => By::Clusters,

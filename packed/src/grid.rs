@@ -186,6 +186,7 @@ pub(crate) fn code_plane(
             return;
         }
     }
+    let mut sums = Sums::new(columns);
     for layer in 0..shape.layers {
         for row in 0..rows {
             let flag = layer * rows + row;
@@ -205,18 +206,20 @@ pub(crate) fn code_plane(
                 }
             }
             let start = shape.row_start(layer, row);
+            sums.of_row(shape, grid, before, layer, start);
             for column in 0..columns {
                 let at = start + column;
-                let sums = around(shape, grid, before, layer, at);
+                let own = sums.own[column] + 4 * now(grid.magnitudes[at - 1]) + now(grid.magnitudes[at - 2]);
+                let others = sums.others[column];
                 let number = first + column;
                 let bit = wanted.magnitude(number) & 1 == 1;
                 let known = grid.magnitudes[at];
                 if known == 0 {
                     let chroma = usize::from(layer > 0);
-                    let [own, others] = [class(sums[0], AROUND), class(sums[1], BEFORE)];
+                    let classes = class(own, AROUND) * BEFORE + class(others, BEFORE);
                     let frequency = shape.frequency(row, column);
-                    let by_sums = &mut contexts.by_sums[(own * BEFORE + others) * 2 + chroma];
-                    let both = class(sums[0] + sums[1], AROUND);
+                    let by_sums = &mut contexts.by_sums[classes * 2 + chroma];
+                    let both = class(own + others, AROUND);
                     let by_frequency =
                         &mut contexts.by_frequency[(both * FREQUENCIES + frequency) * 2 + chroma];
                     if coder.bit_of_two([by_sums, by_frequency], bit) {
@@ -225,7 +228,7 @@ pub(crate) fn code_plane(
                     }
                 } else {
                     let size = known.min(3) as usize - 1;
-                    let context = &mut contexts.more[size][class(sums[0] / 8, 4)];
+                    let context = &mut contexts.more[size][class(own / 8, 4)];
                     grid.magnitudes[at] = 2 * known + u32::from(coder.bit(context, bit));
                 }
             }
@@ -233,34 +236,67 @@ pub(crate) fn code_plane(
     }
 }
 
-/// Weighted sums of magnitudes in units of this plane's step: around a number; and at and around its place in images
-/// before, with the layer before, twice as large.
+/// Weighted sums of magnitudes around the numbers of a row, in units of this plane's step.
+struct Sums {
+    /// Around each number, but for the two to its left, which the row itself changes.
+    own: Vec<u32>,
+    /// At and around its place in images before, with the layer before, twice as large.
+    others: Vec<u32>,
+}
+
+/// A magnitude, no larger than what sums have room for.
 #[inline]
-fn around(shape: &Shape, grid: &Grid, before: Before<'_>, layer: usize, at: usize) -> [u32; 2] {
-    let stride = shape.stride();
-    let m = &grid.magnitudes;
-    // Numbers behind this one are known to the plane before only.
-    let now = |at: usize| m[at].min(1 << 16);
-    let then = |at: usize| 2 * now(at) + u32::from(m[at] > 0);
-    let own = 4 * (now(at - 1) + now(at - stride))
-        + 2 * (now(at - stride - 1) + now(at - stride + 1))
-        + 3 * (then(at + 1) + then(at + stride))
-        + now(at - 2)
-        + now(at - 2 * stride)
-        + then(at + 2)
-        + then(at + 2 * stride)
-        + then(at + stride - 1)
-        + then(at + stride + 1);
-    let of_grid = |grid: &Grid, weights: [u32; 2]| {
-        let m = |at: usize| (grid.magnitudes[at] << 1 >> before.shift).min(1 << 16);
-        weights[0] * m(at) + weights[1] * (m(at - 1) + m(at + 1) + m(at - stride) + m(at + stride))
-    };
-    let [first, second, third] = before.grids;
-    let mut sum = first.map_or(0, |grid| of_grid(grid, [4, 1]));
-    sum += second.map_or(0, |grid| of_grid(grid, [2, 1]));
-    sum += third.map_or(0, |grid| of_grid(grid, [2, 0]));
-    if layer > 0 {
-        sum += 4 * now(at - shape.layer());
+fn now(magnitude: u32) -> u32 {
+    magnitude.min(1 << 16)
+}
+
+/// Twice a magnitude that is known to the plane before only, and about what is not known of it.
+#[inline]
+fn then(magnitude: u32) -> u32 {
+    2 * now(magnitude) + u32::from(magnitude > 0)
+}
+
+impl Sums {
+    fn new(columns: usize) -> Self {
+        Self { own: vec![0; columns], others: vec![0; columns] }
     }
-    [own, sum]
+
+    /// Sums of the row that begins at `start`, of what is known before it is coded.
+    fn of_row(&mut self, shape: &Shape, grid: &Grid, before: Before<'_>, layer: usize, start: usize) {
+        let (stride, columns) = (shape.stride(), shape.columns.len());
+        self.own.fill(0);
+        let mut add = |first: usize, of: fn(u32) -> u32, weight: u32| {
+            let row = &grid.magnitudes[first..][..columns];
+            self.own.iter_mut().zip(row).for_each(|(sum, &magnitude)| *sum += weight * of(magnitude));
+        };
+        let (above, below) = (start - stride, start + stride);
+        add(above, now, 4);
+        add(above - 1, now, 2);
+        add(above + 1, now, 2);
+        add(above - stride, now, 1);
+        add(start + 1, then, 3);
+        add(below, then, 3);
+        add(start + 2, then, 1);
+        add(below + stride, then, 1);
+        add(below - 1, then, 1);
+        add(below + 1, then, 1);
+        self.others.fill(0);
+        let shift = before.shift;
+        for (grid, [here, beside]) in before.grids.iter().zip([[4, 1], [2, 1], [2, 0]]) {
+            let Some(grid) = grid else { continue };
+            let mut add = |first: usize, weight: u32| {
+                let row = &grid.magnitudes[first..][..columns];
+                let pairs = self.others.iter_mut().zip(row);
+                pairs.for_each(|(sum, &magnitude)| *sum += weight * now(magnitude << 1 >> shift));
+            };
+            add(start, here);
+            if beside > 0 {
+                [start - 1, start + 1, above, below].into_iter().for_each(|first| add(first, beside));
+            }
+        }
+        if layer > 0 {
+            let row = &grid.magnitudes[start - shape.layer()..][..columns];
+            self.others.iter_mut().zip(row).for_each(|(sum, &magnitude)| *sum += 4 * now(magnitude));
+        }
+    }
 }

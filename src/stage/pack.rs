@@ -12,6 +12,7 @@ use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::method::tile::Tile;
+use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::Context;
 use crate::run::recipe::{self, Recipe};
@@ -269,6 +270,72 @@ pub fn about(path: &Path) -> Result<About> {
     })
 }
 
+/// A packed model, opened to be evaluated.
+pub(crate) struct Opened {
+    pub(crate) components: Components,
+    pub(crate) views: Vec<Direction>,
+    pub(crate) lights: Vec<Direction>,
+    /// Digest of the file.
+    pub(crate) digest: String,
+    /// What is wrong with its end.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Opens a packed model to be evaluated.
+///
+/// # Errors
+/// A file that is none, or is damaged before its first plane ends; too little memory.
+pub(crate) fn open(path: &Path, context: &Context<'_>) -> Result<Opened> {
+    let (unpacked, digest, bytes) = read(path)?;
+    let notes = notes(&unpacked);
+    let from = unpacked.model;
+    context.require("a packed model", memory_bytes(&from, bytes))?;
+    let count = from.components.len();
+    let turned = |of: fn(&packed::Component) -> &Vec<f64>, length: usize| {
+        let mut all = vec![0.0; length * count];
+        for (number, part) in from.components.iter().enumerate() {
+            let places = all.iter_mut().skip(number).step_by(count);
+            places.zip(of(part)).for_each(|(to, &value)| *to = value as f32);
+        }
+        all
+    };
+    let [height, width] = from.size;
+    Ok(Opened {
+        components: Components {
+            size: Size::new(height, width),
+            brdf: [from.views.len(), from.lights.len()],
+            mean: from.mean.iter().map(|&value| value as f32).collect(),
+            basis: turned(|part| &part.basis, from.brdf()),
+            coefficients: turned(|part| &part.coefficients, from.texels()),
+            channels: from.channels.clone(),
+        },
+        views: directions(path, &from.views)?,
+        lights: directions(path, &from.lights)?,
+        digest,
+        notes,
+    })
+}
+
+/// Memory that a packed model takes in f64 and f32, beside its bytes.
+fn memory_bytes(model: &packed::Model, bytes: usize) -> u64 {
+    (bytes + 24 * (model.components.len() + 1) * (model.brdf() + model.texels())) as u64
+}
+
+/// Directions of a packed model.
+fn directions(file: &Path, list: &[packed::Direction]) -> Result<Vec<Direction>> {
+    let direction = |direction: &packed::Direction| {
+        let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
+        angles.map(Angles::direction).ok_or_else(|| {
+            let packed::Direction { theta_deg, phi_deg } = direction;
+            Error::input(format!(
+                "{}: got the direction theta {theta_deg}, phi {phi_deg}, which is none",
+                file.display()
+            ))
+        })
+    };
+    list.iter().map(direction).collect()
+}
+
 /// What was unpacked.
 #[derive(Clone, Debug)]
 pub struct Restored {
@@ -291,14 +358,6 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
     let notes = notes(&unpacked);
     let psnr_db = unpacked.planes.last().map(|plane| plane.decibels).filter(|&decibels| decibels > 0.0);
     let packed::Unpacked { model: from, .. } = unpacked;
-    let refused = |what: &str| Error::input(format!("{}: {what}", file.display()));
-    let directions = |list: &[packed::Direction]| -> Result<Vec<Direction>> {
-        let direction = |direction: &packed::Direction| {
-            let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
-            angles.map(Angles::direction).ok_or_else(|| refused("a direction that is none"))
-        };
-        list.iter().map(direction).collect()
-    };
     let sample_type =
         text(&from.texts, SAMPLES).and_then(samples_named).unwrap_or(btfkit_formats::SampleType::F32);
     let transfer = match text(&from.texts, TRANSFER) {
@@ -311,17 +370,14 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         size,
         channels: from.channels.clone(),
         sample_type,
-        views: directions(&from.views)?,
-        lights: directions(&from.lights)?,
+        views: directions(file, &from.views)?,
+        lights: directions(file, &from.lights)?,
         transfer,
         white: 1.0,
     };
     // A model whose channels are not understood could not be shown.
     description.decoder()?;
-    context.require(
-        "unpacking components",
-        8 * bytes as u64 + 24 * (from.components.len() * (from.brdf() + from.texels())) as u64,
-    )?;
+    context.require("unpacking components", memory_bytes(&from, bytes))?;
     let model = Model::create(path, context)?;
     let named = text(&from.texts, MEASUREMENT).map_or_else(|| format!("packed:{digest}"), str::to_owned);
     let tile = if from.wraps { "periodic" } else { "none" }.to_owned();

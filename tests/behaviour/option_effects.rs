@@ -54,6 +54,8 @@ use Shown::{Shows, Unseen};
 
 const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
+const OF_COMPONENTS: Shown =
+    Unseen("of a model with components, which the fixture has not; components.rs tries it");
 const READING: Shown = Unseen("as of import, whose recipes show it; refused for stores");
 
 /// All commands whose results have none.
@@ -177,8 +179,26 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
                 Shows(&["--light", "30,90", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"]),
             ),
             ("view", Shows(&["--view", "15,0", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"])),
+            ("by", Unseen("the fixture's model has clusters alone; components.rs tries it")),
             ("json", Shows(&["--json"], &[])),
         ],
+    },
+    Outputs {
+        command: "pack",
+        base: &["{model}", "{new}/m.btfc"],
+        options: &[
+            ("model", ITSELF),
+            ("output", ITSELF),
+            ("quality", OF_COMPONENTS),
+            ("licence", OF_COMPONENTS),
+            ("texel_mm", OF_COMPONENTS),
+            ("json", OF_COMPONENTS),
+        ],
+    },
+    Outputs {
+        command: "unpack",
+        base: &["{new}/m.btfc", "{new}/m.model.zarr"],
+        options: &[("file", ITSELF), ("model", ITSELF)],
     },
     Outputs {
         command: "image",
@@ -373,6 +393,15 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("measurement", PLACE),
             ("model", PLACE),
             ("robust", Changes(&["--robust"])),
+            ("dry_run", TOLD),
+        ],
+    },
+    Recipes {
+        command: "components",
+        options: &[
+            ("measurement", PLACE),
+            ("model", PLACE),
+            ("components", Changes(&["--components", "5"])),
             ("dry_run", TOLD),
         ],
     },

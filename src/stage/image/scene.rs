@@ -14,11 +14,13 @@ use crate::color::Decoder;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
+use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::{measurement_name, open_measurement_of};
 use crate::stage::loss::Beyond;
+use crate::stage::pack;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
@@ -150,6 +152,9 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
+        if pack::is_packed(path) {
+            return of_packed(options, context);
+        }
         let store = Store::at(path);
         let attributes = store.expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
         let digest = attributes.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
@@ -180,14 +185,7 @@ impl Scene {
         };
         store.expect_unchanged()?;
         let whole = Area { y: 0, x: 0, size };
-        let area = options.window.unwrap_or(whole);
-        if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
-            let Area { x, y, size: part } = area;
-            return Err(Error::usage(format!(
-                "window {x},{y},{},{} does not lie within {size}",
-                part.width, part.height
-            )));
-        }
+        let area = shown_part(options, size)?;
         let mut recipe = json!({"kind": kind, "digest": digest, "size": [size.height, size.width]});
         if area != whole {
             recipe["window"] = json!([area.x, area.y, area.size.width, area.size.height]);
@@ -395,6 +393,53 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened>
         size,
         directions,
         components: None,
+    })
+}
+
+/// The part of a plane of this size that is to be shown.
+fn shown_part(options: &Options, size: Size) -> Result<Area> {
+    let area = options.window.unwrap_or(Area { y: 0, x: 0, size });
+    if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
+        let Area { x, y, size: part } = area;
+        return Err(Error::usage(format!(
+            "window {x},{y},{},{} does not lie within {size}",
+            part.width, part.height
+        )));
+    }
+    Ok(area)
+}
+
+/// The tile of a packed model.
+fn of_packed(options: &Options, context: &Context<'_>) -> Result<Scene> {
+    let refused = |what: &str| {
+        Error::usage(format!("{}: a packed model has {what}", options.source.display()))
+            .hint("make a model of it for that: btf unpack")
+    };
+    if options.plane.is_some() {
+        return Err(refused("no endless plane, only its tile"));
+    }
+    if matches!(options.values, Values::Measured(_)) || options.model.is_some() {
+        return Err(refused("its own values"));
+    }
+    let Subject::Appearance { view, light } = options.subject else {
+        return Err(refused("no index and no normals"));
+    };
+    let opened = pack::open(&options.source, context)?;
+    let area = shown_part(options, opened.components.size)?;
+    let [views, lights] =
+        [&opened.views, &opened.lights].map(|list| Interpolator::new(list, &triangulate(list)));
+    let appearance = Appearance::new(&views, &lights, view, light);
+    let colors = context.install(|| opened.components.colors(&appearance))?;
+    let mut directions = notes_of_directions([&opened.views, &opened.lights], view, light);
+    directions.extend(opened.notes);
+    let window = [area.x, area.y, area.size.width as i64, area.size.height as i64];
+    Ok(Scene {
+        source: Source::Tile(Picture::linear(opened.components.size, colors)),
+        area,
+        recipe: json!({"kind": "packed", "digest": opened.digest, "window": window}),
+        beyond: Beyond::default(),
+        directions,
+        incomplete: None,
     })
 }
 

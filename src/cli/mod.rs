@@ -23,6 +23,7 @@ mod normals;
 mod number;
 mod outputs;
 mod progress;
+mod render;
 mod sample;
 mod scene;
 mod source;
@@ -133,6 +134,7 @@ enum Command {
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Render(render::Render),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
@@ -306,6 +308,7 @@ impl Command {
             Self::Appearance(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
+            Self::Render(command) => command.run(given, context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
             Self::Man(command) => command.run(console),

@@ -15,6 +15,7 @@ pub mod judge;
 pub(crate) mod kept;
 pub mod loss;
 pub mod normals;
+pub mod render;
 pub mod sample;
 pub mod status;
 pub mod tile;

@@ -27,6 +27,7 @@ Examples:
   btf render wood.model.zarr --plane --mesh chair.glb --environment studio.exr --out chair.exr
   btf render wood.model.zarr --shape cylinder --frames 48 --turntable --out turn.png      turn-01.png to turn-48.png
   btf render wood.model.zarr --shape plane --frames 36 --light-sweep --shard 0/4 --out sweep.jpg
+  btf render wood.model.zarr --shape interior --compare --out methods.png
 The world: x to the right, y up, z towards a camera in its default place; the object lies around the origin, its radius
 is 1. A light of 1 shows a perfect diffuser that it meets frontally as white, as in `btf image`. Light that surfaces
 reflect onto each other is left out.")]
@@ -122,6 +123,10 @@ pub(super) struct Render {
     /// Jitter of the endless surface, from 0 to 1, as in `btf enlarge`
     #[arg(long, requires = "plane", value_parser = number::share)]
     jitter: Option<f64>,
+    /// Show five ways to cover the object with the material of a model, side by side with labels: the tile repeated, two
+    /// tiles that join each other, the paper's rule with a 2D and a 3D random field, and the coherent rule
+    #[arg(long, conflicts_with_all = ["frames", "plane", "model", "show_environment"])]
+    compare: bool,
     /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
     /// or in the current folder]
     #[arg(long, conflicts_with = "plane")]
@@ -167,6 +172,9 @@ impl Render {
                 ],
                 "of --shape flat, which fills the picture and is seen from afar along its normal",
             )?;
+        }
+        if self.mesh.is_none() && !matches!(self.shape, ShapeName::Interior) {
+            given.refuse_these(&["no_shadows"], "of this shape, which hides no light from itself")?;
         }
         let motion = match (self.frames, self.turntable, self.light_sweep) {
             (Some(count), true, _) => Some((count, Motion::Turntable)),
@@ -227,7 +235,12 @@ impl Render {
             ..options
         };
         let encoding = Encoding::of(&self.out, &Ending::ALL)?.with(None, self.quality)?;
-        let report = render::run(&options, &self.out, encoding, context)?;
+        let report = if self.compare {
+            Ending::of(&self.out, &Ending::DISPLAY)?;
+            render::compare(&options, &self.out, encoding, context)?
+        } else {
+            render::run(&options, &self.out, encoding, context)?
+        };
         let made = report.pictures.iter().map(|&(_, made)| made).find(|made| *made == Made::Written);
         let made = made.or_else(|| report.pictures.first().map(|&(_, made)| made));
         console.line(format!("{}{}", report.summary(), made.map_or("", found)));

@@ -1,4 +1,4 @@
-//! A seat and a dashboard: curved sheets, as materials are shown on in a car, made by formula.
+//! A seat with its headrest and a dashboard: curved sheets, as materials are shown on in a car, made by formula.
 //!
 //! Each sheet is a profile in the plane of y and z, drawn across the width; a third axis of relief lifts bolsters and
 //! hoods off it, and its sides curl inwards. Texture coordinates are lengths along profile and width, so that the
@@ -9,8 +9,8 @@ use super::vector::{Vector, along, cross, length, minus, unit};
 use crate::error::Result;
 
 /// Points along a profile, and across.
-const ALONG: usize = 240;
-const ACROSS: usize = 160;
+const ALONG: usize = 160;
+const ACROSS: usize = 120;
 
 /// A profile swept across a width.
 struct Sheet {
@@ -26,68 +26,82 @@ struct Sheet {
     relief: fn(f64, f64) -> f64,
 }
 
-/// The seat: cushion, backrest and headrest in one piece.
+/// The seat: cushion and backrest in one piece.
 const SEAT: Sheet = Sheet {
     profile: &[
-        [-0.75, 0.70],
-        [-0.62, 0.72],
-        [-0.30, 0.76],
-        [-0.17, 0.66],
-        [-0.17, 0.38],
-        [-0.23, 0.05],
-        [-0.20, -0.14],
-        [0.02, -0.24],
-        [0.45, -0.32],
-        [0.85, -0.42],
-        [1.00, -0.47],
-        [1.07, -0.43],
-        [1.30, -0.44],
-        [1.38, -0.53],
-        [1.30, -0.64],
-        [0.9, -0.66],
+        [-0.86, 0.62],
+        [-0.72, 0.66],
+        [-0.36, 0.72],
+        [-0.21, 0.62],
+        [-0.2, 0.36],
+        [-0.26, 0.05],
+        [-0.22, -0.13],
+        [0.0, -0.22],
+        [0.4, -0.29],
+        [0.76, -0.38],
+        [0.88, -0.44],
+        [0.86, -0.55],
+        [0.6, -0.62],
+        [0.3, -0.6],
     ],
-    half: 0.42,
-    curl: 0.12,
+    half: 0.40,
+    curl: 0.11,
     middle: 0.62,
     relief: |s, t| {
-        // Bolsters at the sides of cushion and backrest, two soft seams across, and a narrow headrest.
-        let side = smooth(0.55, 0.95, t.abs());
-        let body = smooth(0.10, 0.22, s) * (1.0 - smooth(0.74, 0.80, s));
-        let crease = |at: f64| -0.018 * libm::exp(-((s - at) / 0.012) * ((s - at) / 0.012));
-        0.11 * side * body + (crease(0.29) + crease(0.52) + crease(0.64)) * (1.0 - side)
-            - 0.35 * smooth(0.79, 0.84, s) * smooth(0.42, 0.75, t.abs())
+        // Bolsters at the sides, and three soft seams between them.
+        let side = smooth(0.5, 0.95, t.abs());
+        let body = smooth(0.12, 0.25, s) * (1.0 - smooth(0.70, 0.86, s));
+        let seam = |at: f64| -0.02 * libm::exp(-((s - at) / 0.012) * ((s - at) / 0.012));
+        0.12 * side * body + (seam(0.30) + seam(0.53) + seam(0.64)) * (1.0 - side)
     },
+};
+
+/// The headrest.
+const HEADREST: Sheet = Sheet {
+    profile: &[
+        [0.9, -0.56],
+        [0.88, -0.46],
+        [0.93, -0.37],
+        [1.04, -0.35],
+        [1.16, -0.38],
+        [1.22, -0.47],
+        [1.18, -0.57],
+        [1.05, -0.6],
+    ],
+    half: 0.17,
+    curl: 0.09,
+    middle: 0.62,
+    relief: |_, t| 0.02 * (1.0 - t * t),
 };
 
 /// The dashboard: from the knees up over the brow to the windscreen.
 const DASHBOARD: Sheet = Sheet {
     profile: &[
-        [-0.9, -0.7],
-        [-0.75, -0.55],
-        [-0.55, -0.42],
-        [-0.36, -0.34],
-        [-0.18, -0.36],
-        [-0.02, -0.43],
-        [0.14, -0.42],
-        [0.27, -0.37],
-        [0.38, -0.40],
-        [0.43, -0.52],
-        [0.42, -0.72],
+        [-0.95, -0.6],
+        [-0.8, -0.52],
+        [-0.6, -0.4],
+        [-0.4, -0.3],
+        [-0.2, -0.28],
+        [-0.03, -0.33],
+        [0.12, -0.36],
+        [0.26, -0.3],
+        [0.37, -0.32],
+        [0.43, -0.45],
+        [0.44, -0.62],
+        [0.42, -0.8],
         [0.38, -1.0],
-        [0.36, -1.2],
     ],
-    half: 0.78,
-    curl: 0.14,
-    middle: -0.72,
+    half: 0.74,
+    curl: 0.12,
+    middle: -0.70,
     relief: |s, t| {
-        let s = 1.0 - s;
         let bump = |at: [f64; 2], wide: [f64; 2]| {
             let (a, b) = ((s - at[0]) / wide[0], (t - at[1]) / wide[1]);
             libm::exp(-a * a - b * b * b * b)
         };
         // The hood over the instruments, the middle console, and a shelf.
-        0.17 * bump([0.36, -0.45], [0.09, 0.34]) + 0.09 * bump([0.62, 0.42], [0.20, 0.26])
-            - 0.05 * bump([0.58, -0.45], [0.06, 0.36])
+        0.13 * bump([0.70, -0.42], [0.10, 0.36]) + 0.08 * bump([0.34, 0.45], [0.20, 0.24])
+            - 0.05 * bump([0.47, -0.42], [0.06, 0.34])
     },
 };
 
@@ -102,8 +116,8 @@ fn smooth(from: f64, to: f64, at: f64) -> f64 {
 /// # Errors
 /// None that its formula could cause.
 pub fn mesh() -> Result<Mesh> {
-    let mut corners = SEAT.corners();
-    corners.extend(DASHBOARD.corners());
+    let sheets = [SEAT, HEADREST, DASHBOARD];
+    let corners = sheets.iter().flat_map(Sheet::corners).collect();
     Mesh::new(corners)
 }
 

@@ -16,3 +16,5 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 pub(crate) mod triangulation;
+
+pub use triangulation::triangulate as triangles;

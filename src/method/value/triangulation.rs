@@ -15,7 +15,7 @@ const NEGLIGIBLE_WEIGHT: f64 = 1e-9;
 /// Stereographic projection from the nadir maps circles to circles, so the planar Delaunay
 /// triangulation of the projections is the spherical one. Fewer than three directions, or
 /// directions on one arc, have none.
-pub(crate) fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
+pub fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
     let points: Vec<Point> = directions
         .iter()
         .map(|direction| {

@@ -2,6 +2,7 @@
 
 mod material;
 mod objects;
+mod sheets;
 
 use std::path::{Path, PathBuf};
 
@@ -20,6 +21,8 @@ use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
 use crate::words::counted;
+
+pub use sheets::compare;
 
 /// Texels along a length of 1, the radius of an object, at scale 1.
 pub(crate) const DENSITY: f64 = 256.0;

@@ -15,6 +15,9 @@ use crate::shape::Size;
 /// Field of view unless one is chosen, degrees.
 const FOV_DEG: f64 = 30.0;
 
+/// The same of the interior, which is wider than it is high.
+const INTERIOR_FOV_DEG: f64 = 21.0;
+
 /// How far the default camera is: the sphere of radius 1 fills nine tenths of the picture.
 const DISTANCE: f64 = 4.3;
 
@@ -78,11 +81,16 @@ pub(super) fn view(options: &Options, object: &Object) -> View {
     let eye = match &options.shape {
         Shape::Flat | Shape::Plane | Shape::Sphere => [0.0, 0.0, DISTANCE],
         Shape::Cylinder => [0.0, 1.5, 4.03],
-        Shape::Interior | Shape::Mesh(_) => [0.8, 1.35, 4.0],
+        Shape::Interior => [0.5, 1.5, 4.0],
+        Shape::Mesh(_) => [0.8, 1.35, 4.0],
     };
     // Flat, a pixel is 1 / 256 of a length, however large the picture.
     let side = options.size.height.min(options.size.width) as f64 / DENSITY;
-    let fov_deg = if flat { 2.0 * libm::atan(side / 2.0 / DISTANCE).to_degrees() } else { FOV_DEG };
+    let fov_deg = match options.shape {
+        Shape::Flat => 2.0 * libm::atan(side / 2.0 / DISTANCE).to_degrees(),
+        Shape::Interior => INTERIOR_FOV_DEG,
+        _ => FOV_DEG,
+    };
     View {
         eye: chosen.eye.unwrap_or(eye),
         target: chosen.target.unwrap_or([0.0; 3]),

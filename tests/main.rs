@@ -68,6 +68,8 @@ mod picture_formats;
 mod pictures;
 #[path = "behaviour/places.rs"]
 mod places;
+#[path = "behaviour/reading.rs"]
+mod reading;
 #[path = "behaviour/readme.rs"]
 mod readme;
 #[path = "behaviour/real_data.rs"]
@@ -82,6 +84,8 @@ mod safety;
 mod setup;
 #[path = "behaviour/shares.rs"]
 mod shares;
+#[path = "behaviour/slurm.rs"]
+mod slurm;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

@@ -26,6 +26,7 @@ mod progress;
 mod render;
 mod sample;
 mod scene;
+mod slurm;
 mod source;
 mod status;
 mod table;
@@ -138,6 +139,7 @@ enum Command {
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
+    Slurm(slurm::Slurm),
     Completions(help::Completions),
     Man(help::Manual),
 }
@@ -283,6 +285,7 @@ impl Command {
         match self {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
+            Self::Compare(command) => command.goes_on(),
             _ => false,
         }
     }
@@ -295,8 +298,9 @@ impl Command {
             Self::Verify(command) => return command.run(given, context, console),
             Self::Status(command) => return command.run(context, console),
             Self::Missing(command) => command.run(console),
+            Self::Slurm(command) => command.run(context, console),
             Self::Model(command) => return command.run(context, console),
-            Self::Enlarge(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),
             Self::Sample(command) => command.run(context, console),
             Self::Export(command) => command.run(given, context, console),
@@ -464,7 +468,7 @@ mod tests {
 
     use clap::CommandFactory;
 
-    use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
+    use super::option_effects::{COMMON, Effect, OUTPUTS, READING, RECIPES, Shown, WITHOUT};
     use super::*;
 
     #[test]
@@ -503,8 +507,13 @@ mod tests {
             }
             let recipes = RECIPES.iter().filter(|of| of.command == name).flat_map(|of| of.options);
             let outputs = OUTPUTS.iter().filter(|of| of.command == name).flat_map(|of| of.options);
-            let told: BTreeSet<&str> =
-                recipes.map(|(option, _)| *option).chain(outputs.map(|(option, _)| *option)).collect();
+            let reads = OUTPUTS.iter().any(|of| of.command == name && of.reads);
+            let reading = if reads { READING } else { &[] };
+            let told: BTreeSet<&str> = recipes
+                .map(|(option, _)| *option)
+                .chain(outputs.map(|(option, _)| *option))
+                .chain(reading.iter().copied())
+                .collect();
             let found: BTreeSet<&str> =
                 command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
             assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");

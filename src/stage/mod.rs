@@ -17,6 +17,7 @@ pub mod loss;
 pub mod normals;
 pub mod render;
 pub mod sample;
+pub mod slurm;
 pub mod status;
 pub mod tile;
 pub mod verify;

@@ -157,8 +157,9 @@ impl Scene {
         }
         if options.plane.is_some() && kind != model::KIND {
             return Err(Error::usage(format!(
-                "{}: an endless plane is made of a model, got a {kind}",
-                path.display()
+                "{}: an endless plane is made of a model, got {}",
+                path.display(),
+                crate::store::recognise::article(kind)
             )));
         }
         let (Opened { source, size, directions }, digest) = match (kind, options.plane) {
@@ -511,14 +512,14 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         }
         Subject::Normals => {
             return Err(Error::missing(format!("{} has no normals", options.source.display()))
-                .hint("enlarge with --keep-normals to have them"));
+                .hint("enlarge with --keep-normals to have them, under another name or with --force"));
         }
         Subject::Appearance { .. } => {
             return Err(Error::missing(format!(
                 "{} does not say which texel of the tile each of its texels is",
                 options.source.display()
             ))
-            .hint("enlarge by another --method than paper, without --no-source"));
+            .hint("enlarge by another --method than paper, without --no-source, under another name or with --force"));
         }
     };
     Ok(Opened { source, size, directions })

@@ -35,6 +35,7 @@ mod table;
 mod terminal;
 mod tile;
 mod verify;
+mod view;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -141,6 +142,7 @@ enum Command {
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
     Render(render::Render),
+    View(view::View),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
@@ -321,6 +323,7 @@ impl Command {
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
             Self::Render(command) => command.run(given, context, console),
+            Self::View(command) => command.run(context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
             Self::Man(command) => command.run(console),

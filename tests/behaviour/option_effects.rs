@@ -122,6 +122,19 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "view",
+        base: &["{model}", "--export", "{new}/p.html"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("export", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("window", Unseen("of enlargements; viewer.rs tries it")),
+            ("port", Unseen("of the server; viewer.rs tries it")),
+            ("open", Unseen("starts a browser")),
+        ],
+    },
+    Outputs {
         command: "status",
         base: &["{measurement}"],
         reads: false,

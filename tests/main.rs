@@ -23,6 +23,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/components.rs"]
+mod components;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
 #[path = "behaviour/crafted_stores.rs"]
@@ -82,6 +84,8 @@ mod safety;
 mod setup;
 #[path = "behaviour/shares.rs"]
 mod shares;
+#[path = "behaviour/slurm.rs"]
+mod slurm;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

@@ -5,6 +5,7 @@ mod bytes;
 mod check;
 mod cluster;
 mod compare;
+mod components;
 mod curve;
 mod deepzoom;
 mod demo;
@@ -22,9 +23,11 @@ mod model;
 mod normals;
 mod number;
 mod outputs;
+mod pack;
 mod progress;
 mod sample;
 mod scene;
+mod slurm;
 mod source;
 mod status;
 mod table;
@@ -130,12 +133,16 @@ enum Command {
     Normals(normals::Normals),
     Fit(fit::Fit),
     Appearance(appearance::Appearance),
+    Components(components::Components),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
+    Slurm(slurm::Slurm),
     Completions(help::Completions),
     Man(help::Manual),
 }
@@ -281,6 +288,7 @@ impl Command {
         match self {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
+            Self::Compare(command) => command.goes_on(),
             _ => false,
         }
     }
@@ -293,6 +301,7 @@ impl Command {
             Self::Verify(command) => return command.run(given, context, console),
             Self::Status(command) => return command.run(context, console),
             Self::Missing(command) => command.run(console),
+            Self::Slurm(command) => command.run(context, console),
             Self::Model(command) => return command.run(context, console),
             Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),
@@ -304,6 +313,9 @@ impl Command {
             Self::Normals(command) => command.run(context, console),
             Self::Fit(command) => command.run(context, console),
             Self::Appearance(command) => command.run(context, console),
+            Self::Components(command) => command.run(context, console),
+            Self::Pack(command) => command.run(context, console),
+            Self::Unpack(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
             Self::Judge(command) => command.run(context, console),
@@ -356,7 +368,7 @@ impl Console {
     /// The first line of what is told of a stage.
     fn stage(self, label: &str, text: &str) {
         let found = if self.found { "found done: " } else { "" };
-        self.line(format!("{label:<10}{found}{text}"));
+        self.line(format!("{label:<9} {found}{text}"));
     }
 
     /// One line. Whatever it names cannot end it, or change what the terminal shows.

@@ -56,6 +56,8 @@ use Shown::{Shows, Unseen};
 
 const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
+const OF_COMPONENTS: Shown =
+    Unseen("of a model with components, which the fixture has not; components.rs tries it");
 
 /// The options of every command that reads archives. What they do to the result is seen in the recipes of import; for
 /// stores they are refused.
@@ -135,10 +137,34 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "slurm",
+        base: &["{archive}", "--out", "{new}/jobs", "--into", "/stores", "--size", "64x64"],
+        reads: false,
+        options: &[
+            ("inputs", ITSELF),
+            ("out", Unseen("the place of the scripts")),
+            ("into", Shows(&["--into", "/others"], &[])),
+            ("parts", Shows(&["--parts", "3"], &[])),
+            ("cluster_parts", Shows(&["--cluster-parts", "3"], &[])),
+            ("cpus", Shows(&["--cpus", "3"], &[])),
+            ("time", Shows(&["--time", "99"], &[])),
+            ("tile", Shows(&["--tile", "none"], &[])),
+            ("clusters", Shows(&["--clusters", "3"], &[])),
+            ("size", Shows(&["--size", "96x64"], &[])),
+            ("method", Shows(&["--method", "tiles"], &[])),
+            ("deepzoom", Shows(&["--deepzoom"], &[])),
+            ("partition", Shows(&["--partition", "long"], &[])),
+            ("account", Shows(&["--account", "lab"], &[])),
+            ("sbatch", Shows(&["--sbatch=--qos=low"], &[])),
+            ("submit", Unseen("of a cluster; slurm.rs has one of stubs")),
+        ],
+    },
+    Outputs {
         command: "verify",
         base: &["{measurement}"],
         reads: true,
         options: &[
+            ("shard", Shows(&["--shard", "0/2"], &[])),
             ("stores", ITSELF),
             ("model", Unseen("another model is refused, the right one is found without")),
             ("archive", Shows(&["--source", "{archive}"], &[])),
@@ -171,8 +197,31 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
                 Shows(&["--light", "30,90", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"]),
             ),
             ("view", Shows(&["--view", "15,0", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"])),
+            ("by", Unseen("the fixture's model has clusters alone; components.rs tries it")),
+            ("partial", Shows(&["--partial", "{new}/sums"], &[])),
+            ("shard", Shows(&["--partial", "{new}/sums", "--shard", "0/2"], &["--partial", "{new}/sums"])),
+            ("reduce", Unseen("another way to the same figures; shares.rs tries it")),
             ("json", Shows(&["--json"], &[])),
         ],
+    },
+    Outputs {
+        command: "pack",
+        base: &["{model}", "{new}/m.btfc"],
+        reads: false,
+        options: &[
+            ("model", ITSELF),
+            ("output", ITSELF),
+            ("quality", OF_COMPONENTS),
+            ("licence", OF_COMPONENTS),
+            ("texel_mm", OF_COMPONENTS),
+            ("json", OF_COMPONENTS),
+        ],
+    },
+    Outputs {
+        command: "unpack",
+        base: &["{new}/m.btfc", "{new}/m.model.zarr"],
+        reads: false,
+        options: &[("file", ITSELF), ("model", ITSELF)],
     },
     Outputs {
         command: "image",
@@ -248,6 +297,12 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (&["compare", "{model}", "{measurement}", "--view", "30,0"], "--picture"),
     (&["judge", "{enlarged}", "--against", "{measurement}", "--size", "64x64"], "--size"),
     (&["judge", "{model}", "--against", "{measurement}", "--size", "64x64", "--model", "{model}"], "--model"),
+    (&["compare", "{model}", "{measurement}", "--shard", "0/2"], "--partial"),
+    (&["compare", "{model}", "{measurement}", "--reduce"], "--partial"),
+    (&["slurm", "{archive}", "--out", "{new}/jobs", "--deepzoom"], "--size"),
+    (&["slurm", "{archive}", "--out", "{new}/jobs", "--method", "tiles"], "--size"),
+    (&["export", "{measurement}", "{new}/e.npy", "--shard", "0/2"], "--shard"),
+    (&["verify", "{model}", "--shard", "0/2"], "--shard"),
     (&["verify", "{measurement}", "--transpose"], "--transpose"),
     (&["verify", "{measurement}", "--model", "{model}"], "--model"),
     (&["verify", "{model}", "--model", "{model}"], "--model"),
@@ -382,6 +437,15 @@ pub(crate) const RECIPES: &[Recipes] = &[
         ],
     },
     Recipes {
+        command: "components",
+        options: &[
+            ("measurement", PLACE),
+            ("model", PLACE),
+            ("components", Changes(&["--components", "5"])),
+            ("dry_run", TOLD),
+        ],
+    },
+    Recipes {
         command: "fit",
         options: &[
             ("model", PLACE),
@@ -468,6 +532,7 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("format", Changes(&["--format", "jpeg"])),
             ("tile_size", Changes(&["--tile-size", "128"])),
             ("overlap", Changes(&["--overlap", "2"])),
+            ("shard", Keeps(&["--shard", "0/2"])),
             ("dry_run", TOLD),
             ("json", TOLD),
         ],

@@ -23,6 +23,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/components.rs"]
+mod components;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
 #[path = "behaviour/crafted_stores.rs"]
@@ -68,6 +70,8 @@ mod picture_formats;
 mod pictures;
 #[path = "behaviour/places.rs"]
 mod places;
+#[path = "behaviour/reading.rs"]
+mod reading;
 #[path = "behaviour/readme.rs"]
 mod readme;
 #[path = "behaviour/real_data.rs"]

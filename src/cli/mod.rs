@@ -5,6 +5,7 @@ mod bytes;
 mod check;
 mod cluster;
 mod compare;
+mod components;
 mod curve;
 mod deepzoom;
 mod demo;
@@ -22,6 +23,7 @@ mod model;
 mod normals;
 mod number;
 mod outputs;
+mod pack;
 mod progress;
 mod sample;
 mod scene;
@@ -131,6 +133,9 @@ enum Command {
     Normals(normals::Normals),
     Fit(fit::Fit),
     Appearance(appearance::Appearance),
+    Components(components::Components),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
@@ -298,7 +303,7 @@ impl Command {
             Self::Missing(command) => command.run(console),
             Self::Slurm(command) => command.run(context, console),
             Self::Model(command) => return command.run(context, console),
-            Self::Enlarge(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),
             Self::Sample(command) => command.run(context, console),
             Self::Export(command) => command.run(given, context, console),
@@ -308,6 +313,9 @@ impl Command {
             Self::Normals(command) => command.run(context, console),
             Self::Fit(command) => command.run(context, console),
             Self::Appearance(command) => command.run(context, console),
+            Self::Components(command) => command.run(context, console),
+            Self::Pack(command) => command.run(context, console),
+            Self::Unpack(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
             Self::Judge(command) => command.run(context, console),
@@ -360,7 +368,7 @@ impl Console {
     /// The first line of what is told of a stage.
     fn stage(self, label: &str, text: &str) {
         let found = if self.found { "found done: " } else { "" };
-        self.line(format!("{label:<10}{found}{text}"));
+        self.line(format!("{label:<9} {found}{text}"));
     }
 
     /// One line. Whatever it names cannot end it, or change what the terminal shows.
@@ -465,7 +473,7 @@ mod tests {
 
     use clap::CommandFactory;
 
-    use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
+    use super::option_effects::{COMMON, Effect, OUTPUTS, READING, RECIPES, Shown, WITHOUT};
     use super::*;
 
     #[test]
@@ -504,8 +512,13 @@ mod tests {
             }
             let recipes = RECIPES.iter().filter(|of| of.command == name).flat_map(|of| of.options);
             let outputs = OUTPUTS.iter().filter(|of| of.command == name).flat_map(|of| of.options);
-            let told: BTreeSet<&str> =
-                recipes.map(|(option, _)| *option).chain(outputs.map(|(option, _)| *option)).collect();
+            let reads = OUTPUTS.iter().any(|of| of.command == name && of.reads);
+            let reading = if reads { READING } else { &[] };
+            let told: BTreeSet<&str> = recipes
+                .map(|(option, _)| *option)
+                .chain(outputs.map(|(option, _)| *option))
+                .chain(reading.iter().copied())
+                .collect();
             let found: BTreeSet<&str> =
                 command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
             assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");

@@ -1,9 +1,11 @@
 use std::path::{Path, PathBuf};
 
+use btfkit::archive::Reading;
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
+use btfkit::store::measurement::Measurement;
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
@@ -21,7 +23,7 @@ Everything is read: every chunk of every array, and all metadata, which must agr
 
 Examples:
   btf verify wood.zarr
-  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
+  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample, read as it was imported
   btf verify wood.model.zarr
   btf verify wood-4k.zarr                           with its model, which lies beside it or is named by --model
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
@@ -80,7 +82,14 @@ impl Verify {
 
     /// Looks at one store or pyramid.
     fn look(&self, path: &Path, context: &Context<'_>) -> Result<Found> {
-        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
+        let source = if self.archive.is_empty() {
+            None
+        } else {
+            let reading = Measurement::open(path)
+                .map(|store| Reading::in_recipe(&store.recipe().reading))
+                .unwrap_or_default();
+            Some(self.source.open_as_in(reading, &self.archive)?)
+        };
         let model = self.model.clone();
         verify::run(path, &Beside { source: source.as_deref(), model, shard: self.shard }, context)
     }
@@ -150,6 +159,10 @@ fn of_measurement(report: &measurement::Report, views: usize) -> String {
     for (view, light) in &report.different_images {
         text.push_str(&format!("\ndifferent: view {view}, light {light}"));
     }
+    let more = report.images_different.saturating_sub(report.different_images.len());
+    if more > 0 {
+        text.push_str(&format!("\nand {more} more"));
+    }
     text
 }
 
@@ -167,7 +180,10 @@ fn judge(store: &Path, found: &Found) -> Result<()> {
             match report.different {
                 Some(count) if count > 0 => {
                     let what = format!("{store}: {} unlike the archive's", counted(count, "sample"));
-                    return Err(Error::input(what));
+                    return Err(Error::input(what).hint(
+                        "the archive is read as it was imported unless an option here asks for another reading; \
+                         --pattern and --table are to be given again",
+                    ));
                 }
                 _ => {}
             }

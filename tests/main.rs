@@ -23,6 +23,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/components.rs"]
+mod components;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
 #[path = "behaviour/crafted_stores.rs"]
@@ -68,18 +70,24 @@ mod picture_formats;
 mod pictures;
 #[path = "behaviour/places.rs"]
 mod places;
+#[path = "behaviour/reading.rs"]
+mod reading;
 #[path = "behaviour/readme.rs"]
 mod readme;
 #[path = "behaviour/real_data.rs"]
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/rendering.rs"]
+mod rendering;
 #[path = "behaviour/safety.rs"]
 mod safety;
 #[path = "behaviour/setup.rs"]
 mod setup;
 #[path = "behaviour/shares.rs"]
 mod shares;
+#[path = "behaviour/slurm.rs"]
+mod slurm;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

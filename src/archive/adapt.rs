@@ -1,10 +1,11 @@
 //! Mending what is known to be wrong with an archive while it is read: directions that are mirrored, turned or
-//! exchanged, images that are transposed, a cosine that is missing, samples of an unwanted type.
+//! exchanged, elevations in the place of polar angles, images that are transposed, a cosine that is missing, samples of
+//! an unwanted type.
 
 use std::ops::Range;
 use std::path::Path;
 
-use btfkit_formats::{About, Contents, Direction, SampleType, Samples, f16};
+use btfkit_formats::{About, Contents, SampleType, Samples, f16};
 use serde::{Deserialize, Serialize};
 
 use super::{Reading, Source};
@@ -12,16 +13,33 @@ use crate::color::{LightnessCodes, Remarkable, Transfer};
 use crate::error::{Error, Result};
 use crate::run::Context;
 
-/// Which azimuths run the wrong way round.
+/// Whose directions are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Mirrored {
-    /// Of lights and views.
+pub enum Side {
+    /// Those of lights and views.
     Both,
-    /// Of lights.
+    /// Those of lights.
     Lights,
-    /// Of views.
+    /// Those of views.
     Views,
+}
+
+impl Side {
+    /// The side that is lights, or views, or both; none of neither.
+    pub fn of(lights: bool, views: bool) -> Option<Self> {
+        match (lights, views) {
+            (true, true) => Some(Self::Both),
+            (true, false) => Some(Self::Lights),
+            (false, true) => Some(Self::Views),
+            (false, false) => None,
+        }
+    }
+
+    /// Whether lights, and whether views are meant.
+    pub fn lights_and_views(side: Option<Self>) -> [bool; 2] {
+        [Self::Lights, Self::Views].map(|one| side.is_some_and(|side| side == Self::Both || side == one))
+    }
 }
 
 /// What is to be done to every image and direction of an archive. The default does nothing.
@@ -30,10 +48,16 @@ pub enum Mirrored {
 pub struct Adaptation {
     /// Views of the archive that are left out.
     pub drop_views: Vec<usize>,
+    /// Lights that are left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub drop_lights: Vec<usize>,
     /// What the archive calls light is the view, and the other way round.
     pub swap: bool,
+    /// What the archive calls theta is the elevation above the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elevations: Option<Side>,
     /// Azimuths run clockwise.
-    pub mirrored: Option<Mirrored>,
+    pub mirrored: Option<Side>,
     /// Counter-clockwise turn of all directions, degrees: a multiple of 90.
     pub turn_deg: u16,
     /// Rows and columns of the images are exchanged.
@@ -75,8 +99,10 @@ impl Adaptation {
     /// What it does to an archive: whatever asks for what the archive is already is left out, and what the archive
     /// asks for itself is put in. So different words for the same bytes are the same.
     fn effective(mut self, of: &Contents) -> Self {
-        self.drop_views.sort_unstable();
-        self.drop_views.dedup();
+        for numbers in [&mut self.drop_views, &mut self.drop_lights] {
+            numbers.sort_unstable();
+            numbers.dedup();
+        }
         self.cosine_excluded |= !of.cosine_included;
         self.transfer = self.transfer.filter(|&transfer| (transfer == Transfer::Linear) != of.linear);
         self.samples = self.samples.filter(|&name| SampleType::from(name) != of.sample_type);
@@ -87,7 +113,7 @@ impl Adaptation {
 /// The source as it should have been.
 ///
 /// # Errors
-/// A view to drop that there is none of, or no view left.
+/// A view or light to drop that there is none of, none left, or elevations that are one direction.
 pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn Source>> {
     let of = inner.contents();
     let adaptation = reading.adaptation.effective(of);
@@ -103,30 +129,13 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
         About::Azimuths => adaptation.mirrored.is_none() && adaptation.turn_deg == 0,
         About::Cosine => !(adaptation.cosine_excluded && of.cosine_included),
         About::Transfer => adaptation.transfer.is_none(),
-        About::Other => true,
+        About::Views | About::Other => true,
     });
-    let [mut views, mut lights] = [of.views.clone(), of.lights.clone()];
-    if adaptation.swap {
-        std::mem::swap(&mut views, &mut lights);
-    }
-    if let Some(&beyond) = adaptation.drop_views.iter().find(|&&view| view >= views.len()) {
-        let found =
-            format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
-        return Err(Error::usage(found));
-    }
-    let kept: Vec<usize> = (0..views.len()).filter(|view| !adaptation.drop_views.contains(view)).collect();
-    if kept.is_empty() {
-        return Err(Error::usage(format!("{}: no view is left", inner.path().display())));
-    }
-    let turn = f64::from(adaptation.turn_deg).to_radians();
-    let turned = |direction: &Direction, mirrored: bool| {
-        let phi = if mirrored { -direction.phi_rad } else { direction.phi_rad };
-        Direction { phi_rad: (phi + turn).rem_euclid(std::f64::consts::TAU), ..*direction }
-    };
-    let mirrored =
-        |one| matches!(adaptation.mirrored, Some(found) if found == Mirrored::Both || found == one);
-    contents.views = kept.iter().map(|&view| turned(&views[view], mirrored(Mirrored::Views))).collect();
-    contents.lights = lights.iter().map(|light| turned(light, mirrored(Mirrored::Lights))).collect();
+    let [kept_lights, kept_views] = adaptation.kept(of, inner.path())?;
+    let [mut lights, mut views] = adaptation.directions(of, inner.path())?;
+    lights = kept_lights.iter().map(|&light| lights[light]).collect();
+    views = kept_views.iter().map(|&view| views[view]).collect();
+    (contents.lights, contents.views) = (lights, views);
     if adaptation.transpose {
         (contents.width, contents.height) = (contents.height, contents.width);
     }
@@ -139,7 +148,8 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
     Ok(Box::new(Adapted {
         inner,
         contents,
-        kept,
+        kept_views,
+        kept_lights,
         swap: adaptation.swap,
         transpose: adaptation.transpose,
         cosines,
@@ -151,7 +161,9 @@ struct Adapted {
     inner: Box<dyn Source>,
     contents: Contents,
     /// The inner source's number of each view (of each light, where they are exchanged).
-    kept: Vec<usize>,
+    kept_views: Vec<usize>,
+    /// The same of each light.
+    kept_lights: Vec<usize>,
     swap: bool,
     transpose: bool,
     /// What each light's samples are multiplied by, in linear light.
@@ -218,16 +230,26 @@ impl Source for Adapted {
 impl Adapted {
     /// Images in their own type, of the right directions and the right way round.
     fn mended(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
-        let view = *self.kept.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
-        let mut samples = if self.swap {
-            let mut samples = Samples::none(self.inner.contents().sample_type);
-            for light in lights.clone() {
-                samples.append(&self.inner.read_images(light, view..view + 1)?);
+        let view = *self.kept_views.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
+        let lights = self.kept_lights.get(lights).ok_or_else(|| Error::internal("no such lights"))?;
+        let read = |run: &[usize]| match run {
+            [first, .., last] if !self.swap => self.inner.read_images(view, *first..last + 1),
+            [light] if !self.swap => self.inner.read_images(view, *light..light + 1),
+            lights => {
+                let mut samples = Samples::none(self.inner.contents().sample_type);
+                for &light in lights {
+                    samples.append(&self.inner.read_images(light, view..view + 1)?);
+                }
+                Ok(samples)
             }
-            samples
-        } else {
-            self.inner.read_images(view, lights.clone())?
         };
+        // Lights that follow each other in the archive are read at once.
+        let mut runs = lights.chunk_by(|a, b| a + 1 == *b);
+        let mut samples =
+            runs.next().map_or_else(|| Ok(Samples::none(self.inner.contents().sample_type)), read)?;
+        for run in runs {
+            samples.append(&read(run)?);
+        }
         let Contents { width, height, channels, .. } = &self.contents;
         if self.transpose {
             samples = transposed(&samples, *height as usize, *width as usize, channels.len());
@@ -291,6 +313,8 @@ pub(crate) fn half(value: f64) -> f16 {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use btfkit_formats::Direction;
+
     use super::*;
 
     fn adapted(
@@ -352,7 +376,7 @@ mod tests {
         let adaptation = Adaptation {
             swap: true,
             drop_views: vec![1],
-            mirrored: Some(Mirrored::Lights),
+            mirrored: Some(Side::Lights),
             turn_deg: 90,
             ..Adaptation::default()
         };

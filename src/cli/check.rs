@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use btfkit::archive::Reading;
 use btfkit::check::archive_views::ArchiveViews;
 use btfkit::check::finding::MOST_ALARM;
 use btfkit::check::{self, Finding, Report, State, Statistics};
@@ -61,7 +62,9 @@ impl Check {
         if self.json {
             console.plan(&with_notes(&report, &notes)?)?;
         } else {
-            print_report(&report, console);
+            // What is a store already is made anew.
+            let again = if is_store(first(&self.paths)) { "--force " } else { "" };
+            print_report(&report, again, console);
             console.notes(&notes);
         }
         if let Some(path) = &self.picture {
@@ -78,9 +81,7 @@ impl Check {
             given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
-            // One that was made by an older version, or crafted, may not say how it was read.
-            let reading = measurement.recipe().reading.clone();
-            report.beside(&serde_json::from_value(reading).unwrap_or_default());
+            report.beside(&Reading::in_recipe(&measurement.recipe().reading).adaptation);
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;
@@ -145,7 +146,7 @@ fn open(path: &Path) -> Result<Measurement> {
     Ok(measurement)
 }
 
-fn print_report(report: &Report, console: Console) {
+fn print_report(report: &Report, again: &str, console: Console) {
     let mut rows = vec![row!["check", "result", "of alarm", ""]];
     for check in &report.checks {
         let state = match check.state {
@@ -167,7 +168,7 @@ fn print_report(report: &Report, console: Console) {
         console.line(format!("  {}", finding.message));
         console.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
-            console.line(format!("  repair:   btf import ... {repair}"));
+            console.line(format!("  repair:   btf import ... {again}{repair}"));
         }
     }
 }

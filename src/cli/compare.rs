@@ -4,14 +4,17 @@ use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
+use btfkit::run::partial::Sharing;
+use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
+use btfkit::stage::compare::By;
 use btfkit::stage::{compare, image};
 use btfkit::store;
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::{self, Model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -19,8 +22,11 @@ use super::{Console, as_json};
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
-Example:
-  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0")]
+Examples:
+  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0
+Share the work between processes; the figures are those of one:
+  btf compare wood.zarr wood.model.zarr --partial sums --shard 0/8     ... 7/8, in any order
+  btf compare wood.zarr wood.model.zarr --partial sums --reduce        exit code 66 if a part is missing")]
 pub(super) struct Compare {
     /// The measurement
     measurement: PathBuf,
@@ -36,12 +42,37 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
+    /// What of the model is compared [default: clusters, if it has them]
+    #[arg(long, value_enum)]
+    by: Option<ByName>,
+    /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
+    #[arg(long, value_name = "DIR")]
+    partial: Option<PathBuf>,
+    /// Compare only part K of N of the views, K from 0, in any order; `env` takes both from the variables of Slurm or MPI
+    #[arg(long, requires = "partial", value_name = "K/N|env", default_value = "0/1")]
+    shard: Shard,
+    /// Compare nothing, only put the sums in the folder together
+    #[arg(long, requires = "partial", conflicts_with = "shard")]
+    reduce: bool,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum ByName {
+    /// Its clusters
+    Clusters,
+    /// Its components
+    Components,
+}
+
 impl Compare {
+    /// Whether the same command goes on where it was stopped.
+    pub(super) fn goes_on(&self) -> bool {
+        self.partial.is_some()
+    }
+
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         // Both are read, so what they are tells which is which.
@@ -50,7 +81,25 @@ impl Compare {
         let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
         let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
-        let report = compare::run(&model, &measurement, context)?;
+        let by = match self.by {
+            Some(ByName::Clusters) => By::Clusters,
+            Some(ByName::Components) => By::Components,
+            None => By::of(&model)?,
+        };
+        let report = match &self.partial {
+            None => compare::run(&model, &measurement, by, context)?,
+            Some(folder) => {
+                let shard = (!self.reduce).then_some(self.shard);
+                let sharing = Sharing { folder: folder.clone(), shard };
+                let shared = compare::run_shared(&model, &measurement, by, &sharing, context)?;
+                let Some(report) = shared.report else {
+                    let views = counted(shared.views, "view");
+                    console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
+                    return Ok(());
+                };
+                report
+            }
+        };
         if self.json {
             let value = as_json(&report)?;
             console.plan(&value)?;
@@ -71,11 +120,16 @@ impl Compare {
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
-            if report.all.hues_are_lost() {
+            if by == By::Components {
+                console.line("by the components of the model");
+            } else if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
-                     texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
-                    report.all.ciede2000, report.all.lightness
+                     texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
+                    report.all.ciede2000,
+                    report.all.lightness,
+                    measurement.path().display(),
+                    model.path().display()
                 ));
             }
             if report.all.samples_left_out > 0 {
@@ -85,7 +139,7 @@ impl Compare {
         }
         match &self.picture {
             Some(path) => {
-                self.side_by_side(&model, &measurement, context)?.write(path, context.existing)?;
+                self.side_by_side(&model, &measurement, by, context)?.write(path, context.existing)?;
                 if !self.json {
                     let description = measurement.description();
                     let measured = [&description.views[..], &description.lights];
@@ -101,12 +155,18 @@ impl Compare {
         &self,
         model: &Model,
         measurement: &Measurement,
+        by: By,
         context: &Context<'_>,
     ) -> Result<Picture> {
         let tile = model.tile()?;
         let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
-        let colors = image::cluster_colors(model, self.view, self.light)?;
-        let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
+        let modelled = match by {
+            By::Clusters => {
+                let colors = image::cluster_colors(model, self.view, self.light)?;
+                image::look_up(tile.size, &model.index()?, &colors)?
+            }
+            By::Components => image::of_components(model, self.view, self.light, context)?,
+        };
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]

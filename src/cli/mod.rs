@@ -5,6 +5,7 @@ mod bytes;
 mod check;
 mod cluster;
 mod compare;
+mod components;
 mod curve;
 mod deepzoom;
 mod demo;
@@ -22,9 +23,12 @@ mod model;
 mod normals;
 mod number;
 mod outputs;
+mod pack;
 mod progress;
+mod render;
 mod sample;
 mod scene;
+mod slurm;
 mod source;
 mod status;
 mod table;
@@ -131,13 +135,18 @@ enum Command {
     Normals(normals::Normals),
     Fit(fit::Fit),
     Appearance(appearance::Appearance),
+    Components(components::Components),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Render(render::Render),
     View(view::View),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
+    Slurm(slurm::Slurm),
     Completions(help::Completions),
     Man(help::Manual),
 }
@@ -283,6 +292,7 @@ impl Command {
         match self {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
+            Self::Compare(command) => command.goes_on(),
             _ => false,
         }
     }
@@ -295,8 +305,9 @@ impl Command {
             Self::Verify(command) => return command.run(given, context, console),
             Self::Status(command) => return command.run(context, console),
             Self::Missing(command) => command.run(console),
+            Self::Slurm(command) => command.run(context, console),
             Self::Model(command) => return command.run(context, console),
-            Self::Enlarge(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),
             Self::Sample(command) => command.run(context, console),
             Self::Export(command) => command.run(given, context, console),
@@ -306,8 +317,12 @@ impl Command {
             Self::Normals(command) => command.run(context, console),
             Self::Fit(command) => command.run(context, console),
             Self::Appearance(command) => command.run(context, console),
+            Self::Components(command) => command.run(context, console),
+            Self::Pack(command) => command.run(context, console),
+            Self::Unpack(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
+            Self::Render(command) => command.run(given, context, console),
             Self::View(command) => command.run(context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
@@ -359,7 +374,7 @@ impl Console {
     /// The first line of what is told of a stage.
     fn stage(self, label: &str, text: &str) {
         let found = if self.found { "found done: " } else { "" };
-        self.line(format!("{label:<10}{found}{text}"));
+        self.line(format!("{label:<9} {found}{text}"));
     }
 
     /// One line. Whatever it names cannot end it, or change what the terminal shows.
@@ -464,7 +479,7 @@ mod tests {
 
     use clap::CommandFactory;
 
-    use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
+    use super::option_effects::{COMMON, Effect, OUTPUTS, READING, RECIPES, Shown, WITHOUT};
     use super::*;
 
     #[test]
@@ -503,8 +518,13 @@ mod tests {
             }
             let recipes = RECIPES.iter().filter(|of| of.command == name).flat_map(|of| of.options);
             let outputs = OUTPUTS.iter().filter(|of| of.command == name).flat_map(|of| of.options);
-            let told: BTreeSet<&str> =
-                recipes.map(|(option, _)| *option).chain(outputs.map(|(option, _)| *option)).collect();
+            let reads = OUTPUTS.iter().any(|of| of.command == name && of.reads);
+            let reading = if reads { READING } else { &[] };
+            let told: BTreeSet<&str> = recipes
+                .map(|(option, _)| *option)
+                .chain(outputs.map(|(option, _)| *option))
+                .chain(reading.iter().copied())
+                .collect();
             let found: BTreeSet<&str> =
                 command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
             assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");

@@ -1,8 +1,11 @@
 use std::path::{Path, PathBuf};
 
+use btfkit::archive::Reading;
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
+use btfkit::run::shard::Shard;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
+use btfkit::store::measurement::Measurement;
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
@@ -20,11 +23,12 @@ Everything is read: every chunk of every array, and all metadata, which must agr
 
 Examples:
   btf verify wood.zarr
-  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
+  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample, read as it was imported
   btf verify wood.model.zarr
   btf verify wood-4k.zarr                           with its model, which lies beside it or is named by --model
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
   btf verify stores/*.zarr                          one line each, and a count
+  btf verify wall.zarr --shard 3/8                  the fourth of eight jobs that share the work; all must end with 0
 The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
     /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); if there are
@@ -38,6 +42,10 @@ pub(super) struct Verify {
     /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
+    /// Look only at part K of N of the views of a measurement, or of the rows of shards of an enlargement, K from 0, so
+    /// that N jobs share the work; `env` takes both from the variables of Slurm or MPI
+    #[arg(long, value_name = "K/N|env", default_value = "0/1")]
+    shard: Shard,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -74,8 +82,16 @@ impl Verify {
 
     /// Looks at one store or pyramid.
     fn look(&self, path: &Path, context: &Context<'_>) -> Result<Found> {
-        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
-        verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
+        let source = if self.archive.is_empty() {
+            None
+        } else {
+            let reading = Measurement::open(path)
+                .map(|store| Reading::in_recipe(&store.recipe().reading))
+                .unwrap_or_default();
+            Some(self.source.open_as_in(reading, &self.archive)?)
+        };
+        let model = self.model.clone();
+        verify::run(path, &Beside { source: source.as_deref(), model, shard: self.shard }, context)
     }
 }
 
@@ -143,6 +159,10 @@ fn of_measurement(report: &measurement::Report, views: usize) -> String {
     for (view, light) in &report.different_images {
         text.push_str(&format!("\ndifferent: view {view}, light {light}"));
     }
+    let more = report.images_different.saturating_sub(report.different_images.len());
+    if more > 0 {
+        text.push_str(&format!("\nand {more} more"));
+    }
     text
 }
 
@@ -160,7 +180,10 @@ fn judge(store: &Path, found: &Found) -> Result<()> {
             match report.different {
                 Some(count) if count > 0 => {
                     let what = format!("{store}: {} unlike the archive's", counted(count, "sample"));
-                    return Err(Error::input(what));
+                    return Err(Error::input(what).hint(
+                        "the archive is read as it was imported unless an option here asks for another reading; \
+                         --pattern and --table are to be given again",
+                    ));
                 }
                 _ => {}
             }

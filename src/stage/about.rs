@@ -6,7 +6,9 @@ use btfkit_formats::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use crate::archive::Reading;
 use crate::error::Result;
+use crate::method::coherent::JITTER_ONE;
 pub use crate::stage::deepzoom::Pyramidal;
 pub use crate::stage::kept::Kept;
 use crate::stage::kept::bytes_below;
@@ -15,6 +17,7 @@ use crate::stage::{cluster, deepzoom, normals};
 use crate::store::enlarged::{self, Enlarged, Method};
 use crate::store::measurement::{self, Description, Measurement};
 use crate::store::model::appearance::AppearanceReport;
+use crate::store::model::components::ComponentsReport;
 use crate::store::model::field::FieldReport;
 use crate::store::model::tile::TileRecipe;
 use crate::store::model::tile::TileReport;
@@ -109,6 +112,8 @@ pub struct Measured {
     pub digest: String,
     /// What its archive was.
     pub archive: Option<String>,
+    /// The options by which its archive was read, as `btf import` takes them.
+    pub read_with: Vec<String>,
     /// What had to be assumed.
     pub assumptions: Vec<String>,
 }
@@ -144,6 +149,9 @@ pub struct Modelled {
     pub field: Option<FieldReport>,
     /// How the exemplar is described.
     pub appearance: Option<AppearanceReport>,
+    /// Of components, once they are found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub components: Option<ComponentsReport>,
 }
 
 /// What an enlarged index is.
@@ -224,14 +232,18 @@ fn of_measurement(measurement: &Measurement, kept: impl Fn(u64, bool) -> Kept) -
         views_done,
         digest: measurement.digest().to_owned(),
         archive: Some(recipe.format.clone()).filter(|format| !format.is_empty()),
+        read_with: Reading::in_recipe(&recipe.reading).options(),
         assumptions: recipe.assumptions.clone(),
     }
 }
 
 fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled> {
     let mut stages = Vec::new();
-    for stage in Stage::ALL {
+    for stage in Stage::ALL.into_iter().chain(Stage::OPTIONAL) {
         let recipe = model.recipe_text(stage)?;
+        if recipe.is_none() && Stage::OPTIONAL.contains(&stage) {
+            continue;
+        }
         let done = recipe.is_some() && model.has_arrays(stage)?;
         stages.push(Done { stage: stage.name(), done, recipe });
     }
@@ -248,6 +260,7 @@ fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled>
         normals: is_there(Stage::Normals).then(|| model.report(Stage::Normals)).transpose()?,
         field: is_there(Stage::Fit).then(|| model.report(Stage::Fit)).transpose()?,
         appearance: is_there(Stage::Appearance).then(|| model.report(Stage::Appearance)).transpose()?,
+        components: is_there(Stage::Components).then(|| model.report(Stage::Components)).transpose()?,
         stages,
     })
 }
@@ -256,7 +269,8 @@ fn of_enlarged(enlarged: &Enlarged, kept: impl Fn(u64, bool) -> Kept) -> Grown {
     let recipe = enlarged.recipe();
     let options = [
         ("candidates", recipe.candidates.map(Value::from)),
-        ("jitter", recipe.jitter.map(Value::from)),
+        // In units of the spacing, as the option has it.
+        ("jitter", recipe.jitter.map(|jitter| Value::from(f64::from(jitter) / f64::from(JITTER_ONE)))),
         ("tiles", recipe.tiles.map(Value::from)),
     ];
     let (done, total) = (enlarged.shards_done(), enlarged.shards().texels());

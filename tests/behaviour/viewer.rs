@@ -65,7 +65,7 @@ fn only_who_knows_the_address_of_this_machine_reads_the_page() {
 
     let origin = format!("http://{own}");
     assert_eq!(served.ask("GET", &served.page, &[host[0], ("Origin", &origin)]).0, 200);
-    let longer = format!("{}0", own);
+    let longer = format!("{own}0");
     let wrong_token = format!("/{}/", "0".repeat(32));
     for (status, method, path, headers) in [
         (403, "GET", "/", &host[..]),

@@ -100,6 +100,7 @@ pub mod shape;
 mod signal;
 pub mod stage;
 pub mod store;
+pub mod view;
 
 // For the program, the tests and the benches of this package; no part of the interface.
 #[doc(hidden)]

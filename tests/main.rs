@@ -23,6 +23,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/components.rs"]
+mod components;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
 #[path = "behaviour/crafted_stores.rs"]

@@ -158,7 +158,7 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
     let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
     let compared = times.time("compare", false, || {
         let (model, measurement) = compare::open(&compare)?;
-        compare::run(&model, &measurement, context)
+        compare::run(&model, &measurement, compare::By::Clusters, context)
     })?;
     let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);

@@ -56,6 +56,8 @@ use Shown::{Shows, Unseen};
 
 const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
+const OF_COMPONENTS: Shown =
+    Unseen("of a model with components, which the fixture has not; components.rs tries it");
 const OF_A_FILE: Shown = Unseen("of a file that a test makes; rendering.rs tries it");
 
 /// The options of every command that reads archives. What they do to the result is seen in the recipes of import; for
@@ -120,6 +122,19 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "view",
+        base: &["{model}", "--export", "{new}/p.html"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("export", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("window", Unseen("of enlargements; viewer.rs tries it")),
+            ("port", Unseen("of the server; viewer.rs tries it")),
+            ("open", Unseen("starts a browser")),
+        ],
+    },
+    Outputs {
         command: "status",
         base: &["{measurement}"],
         reads: false,
@@ -138,6 +153,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "slurm",
         base: &["{archive}", "--out", "{new}/jobs", "--into", "/stores", "--size", "64x64"],
+        reads: false,
         options: &[
             ("inputs", ITSELF),
             ("out", Unseen("the place of the scripts")),
@@ -195,11 +211,31 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
                 Shows(&["--light", "30,90", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"]),
             ),
             ("view", Shows(&["--view", "15,0", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"])),
+            ("by", Unseen("the fixture's model has clusters alone; components.rs tries it")),
             ("partial", Shows(&["--partial", "{new}/sums"], &[])),
             ("shard", Shows(&["--partial", "{new}/sums", "--shard", "0/2"], &["--partial", "{new}/sums"])),
             ("reduce", Unseen("another way to the same figures; shares.rs tries it")),
             ("json", Shows(&["--json"], &[])),
         ],
+    },
+    Outputs {
+        command: "pack",
+        base: &["{model}", "{new}/m.btfc"],
+        reads: false,
+        options: &[
+            ("model", ITSELF),
+            ("output", ITSELF),
+            ("quality", OF_COMPONENTS),
+            ("licence", OF_COMPONENTS),
+            ("texel_mm", OF_COMPONENTS),
+            ("json", OF_COMPONENTS),
+        ],
+    },
+    Outputs {
+        command: "unpack",
+        base: &["{new}/m.btfc", "{new}/m.model.zarr"],
+        reads: false,
+        options: &[("file", ITSELF), ("model", ITSELF)],
     },
     Outputs {
         command: "image",
@@ -238,6 +274,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "render",
         base: &["{model}", "--out", "{new}/r.png", "--size", "24x20"],
+        reads: false,
         options: &[
             ("source", ITSELF),
             ("out", Unseen("the name of the result, and its format")),
@@ -455,6 +492,15 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("measurement", PLACE),
             ("model", PLACE),
             ("robust", Changes(&["--robust"])),
+            ("dry_run", TOLD),
+        ],
+    },
+    Recipes {
+        command: "components",
+        options: &[
+            ("measurement", PLACE),
+            ("model", PLACE),
+            ("components", Changes(&["--components", "5"])),
             ("dry_run", TOLD),
         ],
     },

@@ -9,6 +9,7 @@
 //! Radiometry: a stored value is the reflectance times the cosine of the light (rho cos), 1 for a perfect diffuser that
 //! is lit frontally. So BRDF times cosine is the value over pi.
 
+pub mod components;
 pub(crate) mod evaluate;
 pub mod evaluator;
 pub mod locate;

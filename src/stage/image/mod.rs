@@ -17,7 +17,7 @@ use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
-use crate::store::model::Model;
+use crate::store::model::{Model, Stage};
 use btfkit_formats::{Direction, Samples};
 use scene::MEASUREMENT_ROWS;
 pub use scene::{Band, Scene};
@@ -62,9 +62,11 @@ pub struct Options {
 /// Where the values of texels come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Values {
-    /// The representatives of the clusters.
+    /// The representatives of the clusters; the components of a model that has no clusters.
     #[default]
     Model,
+    /// The components of the model.
+    Components,
     /// The measurement itself, through the source of each texel; where it is not named, it lies beside the model.
     Measured(Option<PathBuf>),
 }
@@ -260,11 +262,7 @@ pub fn of_measured_tile(
 
 /// Linear RGB of every cluster of a model under a light, seen from a view.
 pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Result<Vec<[f32; 3]>> {
-    let [views, lights] = model.directions()?;
-    let [view_triangles, light_triangles] = model.triangles()?;
-    let (views, lights) =
-        (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
-    let appearance = Appearance::new(&views, &lights, view, light);
+    let appearance = appearance_of(model, view, light)?;
     let mut colors = Vec::new();
     for clusters in model.representative_chunks()? {
         let representatives = model.representatives_of(clusters)?;
@@ -272,6 +270,34 @@ pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Resul
         colors.extend(appearance.of_brdfs(&representatives.samples, representatives.shape, &decoder));
     }
     Ok(colors)
+}
+
+/// The tile of a model under a light, seen from a view, by its components.
+///
+/// # Errors
+/// A model without components, and too little memory.
+pub fn of_components(
+    model: &Model,
+    view: Direction,
+    light: Direction,
+    context: &Context<'_>,
+) -> Result<Picture> {
+    of_stage(model, Stage::Components, |model| {
+        context.require("a picture by components", model.components_bytes()?)?;
+        let components = model.components()?;
+        let appearance = appearance_of(model, view, light)?;
+        let colors = context.install(|| components.colors(&appearance))?;
+        Ok(Picture::linear(components.size, colors))
+    })
+}
+
+/// How the values of a model are mixed under a light, seen from a view.
+fn appearance_of(model: &Model, view: Direction, light: Direction) -> Result<Appearance> {
+    let [views, lights] = model.directions()?;
+    let [view_triangles, light_triangles] = model.triangles()?;
+    let (views, lights) =
+        (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
+    Ok(Appearance::new(&views, &lights, view, light))
 }
 
 /// Looks up the colour of each texel's cluster.

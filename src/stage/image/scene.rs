@@ -8,17 +8,19 @@ use serde_json::{Value, json};
 
 use super::{
     Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, expect_colors, look_up, mixed,
-    notes_of_directions, of_measured_tile,
+    notes_of_directions, of_components, of_measured_tile,
 };
 use crate::color::Decoder;
 use crate::error::{Error, ErrorKind, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
+use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
 use crate::stage::cluster::{measurement_name, open_measurement_of};
 use crate::stage::loss::Beyond;
+use crate::stage::pack;
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
@@ -82,6 +84,8 @@ struct Opened {
     size: Size,
     /// As in a [`Scene`].
     directions: Vec<String>,
+    /// Digest of the components, where they were asked for.
+    components: Option<String>,
 }
 
 /// Pixels of some rows; looked up row by row, since numbers take less memory.
@@ -148,6 +152,9 @@ impl Scene {
     /// Where there is nothing, or nothing that can be pictured as asked for.
     pub fn open(options: &Options, context: &Context<'_>) -> Result<Self> {
         let path = &options.source;
+        if pack::is_packed(path) {
+            return of_packed(options, context);
+        }
         let store = Store::at(path);
         let attributes = store.expect_one_of(&[measurement::KIND, model::KIND, enlarged::KIND])?;
         let digest = attributes.get("digest").and_then(Value::as_str).unwrap_or_default().to_owned();
@@ -162,11 +169,11 @@ impl Scene {
                 crate::store::recognise::article(kind)
             )));
         }
-        let (Opened { source, size, directions }, digest) = match (kind, options.plane) {
+        let (Opened { source, size, directions, components }, digest) = match (kind, options.plane) {
             (measurement::KIND, _) => (of_measurement(Measurement::open(path)?, options)?, digest),
             (model::KIND, None) => {
                 let model = Model::open(path)?;
-                (of_tile(&model, options, context)?, model.stage_digest(Stage::Cluster)?)
+                (of_tile(&model, options, context)?, shown_digest(&model, options)?)
             }
             (model::KIND, Some(plane)) => return of_plane(&Model::open(path)?, options, plane, context),
             (enlarged::KIND, _) => (of_enlarged(Enlarged::open(path)?, options, context)?, digest),
@@ -179,20 +186,15 @@ impl Scene {
         };
         store.expect_unchanged()?;
         let whole = Area { y: 0, x: 0, size };
-        let area = options.window.unwrap_or(whole);
-        if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
-            let Area { x, y, size: part } = area;
-            return Err(Error::usage(format!(
-                "window {x},{y},{},{} does not lie within {size}",
-                part.width, part.height
-            )));
-        }
+        let area = shown_part(options, size)?;
         let mut recipe = json!({"kind": kind, "digest": digest, "size": [size.height, size.width]});
         if area != whole {
             recipe["window"] = json!([area.x, area.y, area.size.width, area.size.height]);
         }
-        if options.values != Values::Model {
-            recipe["values"] = json!("measured");
+        match &options.values {
+            Values::Model => {}
+            Values::Measured(_) => recipe["values"] = json!("measured"),
+            Values::Components => recipe["values"] = json!({"components": components}),
         }
         let incomplete = source.incomplete(path);
         Ok(Self { source, area, recipe, beyond: Beyond::default(), directions, incomplete })
@@ -387,13 +389,93 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened>
     let (size, decoder) = (description.size, description.decoder()?);
     let directions = notes_of_directions([&description.views, &description.lights], view, light);
     let appearance = super::measured_appearance(&measurement, view, light);
-    Ok(Opened { source: Source::Measurement { measurement, appearance, decoder }, size, directions })
+    Ok(Opened {
+        source: Source::Measurement { measurement, appearance, decoder },
+        size,
+        directions,
+        components: None,
+    })
+}
+
+/// The part of a plane of this size that is to be shown.
+fn shown_part(options: &Options, size: Size) -> Result<Area> {
+    let area = options.window.unwrap_or(Area { y: 0, x: 0, size });
+    if area.within_first_quadrant().is_none_or(|window| !window.fits(size)) {
+        let Area { x, y, size: part } = area;
+        return Err(Error::usage(format!(
+            "window {x},{y},{},{} does not lie within {size}",
+            part.width, part.height
+        )));
+    }
+    Ok(area)
+}
+
+/// The tile of a packed model.
+fn of_packed(options: &Options, context: &Context<'_>) -> Result<Scene> {
+    let refused = |what: &str| {
+        Error::usage(format!("{}: a packed model has {what}", options.source.display()))
+            .hint("make a model of it for that: btf unpack")
+    };
+    if options.plane.is_some() {
+        return Err(refused("no endless plane, only its tile"));
+    }
+    if matches!(options.values, Values::Measured(_)) || options.model.is_some() {
+        return Err(refused("its own values"));
+    }
+    let Subject::Appearance { view, light } = options.subject else {
+        return Err(refused("no index and no normals"));
+    };
+    let opened = pack::open(&options.source, context)?;
+    let area = shown_part(options, opened.components.size)?;
+    let [views, lights] =
+        [&opened.views, &opened.lights].map(|list| Interpolator::new(list, &triangulate(list)));
+    let appearance = Appearance::new(&views, &lights, view, light);
+    let colors = context.install(|| opened.components.colors(&appearance))?;
+    let mut directions = notes_of_directions([&opened.views, &opened.lights], view, light);
+    directions.extend(opened.notes);
+    let window = [area.x, area.y, area.size.width as i64, area.size.height as i64];
+    Ok(Scene {
+        source: Source::Tile(Picture::linear(opened.components.size, colors)),
+        area,
+        recipe: json!({"kind": "packed", "digest": opened.digest, "window": window}),
+        beyond: Beyond::default(),
+        directions,
+        incomplete: None,
+    })
 }
 
 fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let tile = tile_picture(model, options, context)?;
     let size = tile.size;
-    Ok(Opened { source: Source::Tile(tile), size, directions: of_model(model, options)? })
+    let mut directions = of_model(model, options)?;
+    let is_lit = matches!(options.subject, Subject::Appearance { .. });
+    if options.values == Values::Model && is_lit && by_components(model, &options.values)? {
+        directions.push("the model has no clusters: values are those of its components".to_owned());
+    }
+    Ok(Opened { source: Source::Tile(tile), size, directions, components: components_of(model, options)? })
+}
+
+/// Digest of a model's components, where values are theirs by option.
+fn components_of(model: &Model, options: &Options) -> Result<Option<String>> {
+    let wanted = options.values == Values::Components;
+    wanted.then(|| model.stage_digest(Stage::Components)).transpose()
+}
+
+/// Digest of the stage of a model that a picture of its tile shows.
+fn shown_digest(model: &Model, options: &Options) -> Result<String> {
+    let is_lit = matches!(options.subject, Subject::Appearance { .. });
+    let stage =
+        if is_lit && by_components(model, &options.values)? { Stage::Components } else { Stage::Cluster };
+    model.stage_digest(stage)
+}
+
+/// Whether values come from the components: where they are asked for, and where there are no clusters.
+fn by_components(model: &Model, values: &Values) -> Result<bool> {
+    Ok(match values {
+        Values::Components => true,
+        Values::Model => !model.has(Stage::Cluster)? && model.has(Stage::Components)?,
+        Values::Measured(_) => false,
+    })
 }
 
 /// What is to be said of the directions of a picture of a model.
@@ -407,7 +489,10 @@ fn of_model(model: &Model, options: &Options) -> Result<Vec<String>> {
 fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Result<Picture> {
     let tile = model.tile()?;
     match (options.subject, &options.values) {
-        (Subject::Appearance { view, light }, Values::Model) => {
+        (Subject::Appearance { view, light }, values) if by_components(model, values)? => {
+            of_components(model, view, light, context)
+        }
+        (Subject::Appearance { view, light }, Values::Model | Values::Components) => {
             let colors = of_stage(model, Stage::Cluster, |model| cluster_colors(model, view, light))?;
             look_up(tile.size, &of_stage(model, Stage::Cluster, Model::index)?, &colors)
         }
@@ -474,14 +559,21 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
-    let recipe = json!({
+    let mut recipe = json!({
         "kind": "plane",
         "digest": model.digest_of(enlarged::Method::Coherent.stages())?,
         "seed": variation.seed,
         "jitter": variation.jitter,
         "window": [area.x, area.y, area.size.width, area.size.height],
-        "values": if options.values == Values::Model { "model" } else { "measured" },
+        "values": match options.values {
+            Values::Model => "model",
+            Values::Components => "components",
+            Values::Measured(_) => "measured",
+        },
     });
+    if let Some(components) = components_of(model, options)? {
+        recipe["components"] = json!(components);
+    }
     Ok(Scene {
         source: Source::Plane { plane, variation, tile },
         area,
@@ -494,7 +586,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let size = enlarged.size();
-    let mut directions = Vec::new();
+    let (mut directions, mut components) = (Vec::new(), None);
     let source = match options.subject {
         Subject::Appearance { view, light } if options.values == Values::Model => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
@@ -507,6 +599,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
             let tile = tile_picture(&model, options, context)?;
+            components = components_of(&model, options)?;
             directions = of_model(&model, options)?;
             Source::Sources { enlarged, tile }
         }
@@ -522,7 +615,7 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
             .hint("enlarge by another --method than paper, without --no-source, under another name or with --force"));
         }
     };
-    Ok(Opened { source, size, directions })
+    Ok(Opened { source, size, directions, components })
 }
 
 /// The model that an enlarged index at a path refers to; where it is not named, it is looked for where it lay when the

@@ -2,7 +2,7 @@
 
 use super::appearance::{self, AppearanceReport};
 use super::normals::normals_layout;
-use super::{Model, Stage, clusters, field, tile};
+use super::{Model, Stage, clusters, components, field, tile};
 use crate::error::{Error, Result};
 use crate::zarr::checksums::DIGITS;
 use crate::zarr::{Array, DAMAGED, Layout, Named};
@@ -27,15 +27,14 @@ impl Model {
                 let report: AppearanceReport = self.typed(stage, report)?;
                 appearance::arrays(&report, self.clusters()?)
             }
+            Stage::Components => components::arrays(&self.components_shape(&self.typed(stage, report)?)?),
         })
     }
 
     /// Opens an array of a stage.
     pub(super) fn open_array(&self, stage: Stage, name: &str, layout: &Layout<'_>) -> Result<Array> {
         let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
-            crate::error::ErrorKind::Missing => {
-                error.hint(format!("run `btf {}` (or `btf model`) on it again", stage.name()))
-            }
+            crate::error::ErrorKind::Missing => error.hint(format!("run {} on it again", stage.commands())),
             _ => error,
         })?;
         let kept = self.done(stage)?.checksums;

@@ -1,5 +1,5 @@
 //! Pictures against closed forms, and objects against what they must not do.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::sync::atomic::AtomicBool;
 

@@ -136,8 +136,8 @@ impl Reader<'_> {
     fn within(&mut self, [row, column]: [i64; 2], size: Size, wraps: bool) -> [usize; 2] {
         let within = [place_within(row, size.height, wraps), place_within(column, size.width, wraps)];
         // Half a texel beyond is still the border's own; what is told is what is clearly beyond.
-        self.beyond |=
-            !wraps && (row < -1 || row > size.height as i64 || column < -1 || column > size.width as i64);
+        let is_beyond = |place: i64, side: usize| !(-1..=side as i64).contains(&place);
+        self.beyond |= !wraps && (is_beyond(row, size.height) || is_beyond(column, size.width));
         within
     }
 }

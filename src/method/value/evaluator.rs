@@ -127,9 +127,7 @@ impl<V: Values> Evaluator<V> {
                 if weight > 0.0 {
                     let entry = texels.entry(column + beside, row + below)?;
                     let value = self.values.of(entry, mixture);
-                    for channel in 0..3 {
-                        sum[channel] += weight * value[channel];
-                    }
+                    sum = std::array::from_fn(|c| sum[c] + weight * value[c]);
                 }
             }
         }

@@ -84,12 +84,8 @@ impl Locator {
             let Some(facet) = self.facets.get(usize::from(at)) else { break };
             let weight = |row: [f32; 3]| row[0] * x + row[1] * y + row[2] * z;
             let weights = facet.inverse.map(weight);
-            let mut least = 0;
-            for corner in 1..3 {
-                if weights[corner] < weights[least] {
-                    least = corner;
-                }
-            }
+            let lesser = |least: usize, corner| if weights[corner] < weights[least] { corner } else { least };
+            let least = lesser(lesser(0, 1), 2);
             if weights[least] >= -NEGLIGIBLE {
                 return Located { shares: shares(facet.corners, weights), cosine_ratio: 1.0 };
             }

@@ -99,13 +99,9 @@ impl Values for ClusterTable {
             let mut part = [0.0f32; 4];
             for light in mixture.lights {
                 let value = &lights[usize::from(light.number)];
-                for channel in 0..4 {
-                    part[channel] += light.weights[channel] * value[channel];
-                }
+                part = std::array::from_fn(|c| part[c] + light.weights[c] * value[c]);
             }
-            for channel in 0..4 {
-                sum[channel] += view.weight * part[channel];
-            }
+            sum = std::array::from_fn(|c| sum[c] + view.weight * part[c]);
         }
         [sum[0], sum[1], sum[2]]
     }

@@ -137,9 +137,9 @@ fn values_are_exact_where_measured_continuous_between_and_within_bounds() {
         let value = evaluator.value(&mut texels, place, pair[0], pair[1]).unwrap();
         let near = [place[0] + 1e-4, place[1] - 1e-4];
         let beside = evaluator.value(&mut texels, near, moved(pair[0]), moved(pair[1])).unwrap();
-        for channel in 0..3 {
-            assert!((0.0..=1.0).contains(&value[channel]), "{value:?}");
-            assert!((value[channel] - beside[channel]).abs() < 0.03, "{pair:?}: {value:?} {beside:?}");
+        for (value, beside) in value.iter().zip(beside) {
+            assert!((0.0..=1.0).contains(value), "{pair:?}: {value}");
+            assert!((value - beside).abs() < 0.03, "{pair:?}: {value} {beside}");
         }
     }
 }

@@ -92,3 +92,5 @@ mod slurm;
 mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;
+#[path = "behaviour/viewer.rs"]
+mod viewer;

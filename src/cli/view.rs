@@ -50,7 +50,8 @@ impl View {
         }
         let server = viewer.serve(self.port.unwrap_or(0))?;
         let address = server.address();
-        console.line(format!("{address}\nCtrl-C ends it."));
+        console.line(&address);
+        console.line("Ctrl-C ends it.");
         if self.open && !open(&address) {
             console.line("no browser could be started: open the address by hand");
         }

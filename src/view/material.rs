@@ -1,6 +1,6 @@
 //! What the page is given of a model or an enlargement.
 
-use btfkit_formats::{Direction, Samples};
+use btfkit_formats::Samples;
 use serde_json::{Value, json};
 
 use super::Options;

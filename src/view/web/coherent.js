@@ -67,6 +67,8 @@ export const PARITIES = [[0, 0], [1, 1], [0, 1], [1, 0]];
 /** Candidates, the texel's own first. */
 const NEIGHBOURS = [[0, 0], [0, -1], [0, 1], [-1, 0], [-1, -1], [-1, 1], [1, 0], [1, -1], [1, 1]];
 const DIAGONALS = [[-1, -1], [-1, 1], [1, -1], [1, 1]];
+/** Sites that tell of repetition. */
+const SITES = 12;
 
 /** The endless plane of a material. */
 export class Plane {
@@ -85,6 +87,9 @@ export class Plane {
     /** @type {Level[]} */
     this.levels = [];
     this.blurred = this.features();
+    /** What lies around the texel that is being corrected. */
+    this.around = new Int32Array(4 * FEATURES);
+    this.sites = new Int32Array(2 * SITES);
   }
 
   /** Sixteen times the features of every texel of the exemplar. */
@@ -254,53 +259,59 @@ export class Plane {
    * @param {Int32Array | null} before @param {number[]} sides
    */
   best(level, width, positions, at, before, sides) {
-    const { dims, values, repetition } = this.levels[level], spacing = 1 << level;
-    const place = (/** @type {number} */ position, /** @type {number} */ dy, /** @type {number} */ dx) =>
-      (wrapped((position >>> 16) + dy, this.height) * this.width + wrapped((position & 0xffff) + dx, this.width)) * dims;
-    const around = new Int32Array(4 * dims);
-    DIAGONALS.forEach(([i, j], e) => {
-      const near = place(positions[at + i * width + j], 0, 0);
-      const below = place(positions[at + 2 * i * width + j], -i * spacing, 0);
-      const beside = place(positions[at + i * width + 2 * j], 0, -j * spacing);
+    const { dims, values, repetition } = this.levels[level], spacing = 1 << level, around = this.around;
+    for (let e = 0; e < 4; e++) {
+      const [i, j] = DIAGONALS[e];
+      const near = this.place(positions[at + i * width + j], 0, 0) * dims;
+      const below = this.place(positions[at + 2 * i * width + j], -i * spacing, 0) * dims;
+      const beside = this.place(positions[at + i * width + 2 * j], 0, -j * spacing) * dims;
       for (let d = 0; d < dims; d++) around[e * dims + d] = values[near + d] + values[below + d] + values[beside + d];
-    });
+    }
+    if (before) this.lookAtSites(level, width, before, at, sides);
     let best = positions[at], least = Infinity;
-    NEIGHBOURS.forEach(([i, j], n) => {
-      const proposal = positions[at + i * width + j];
-      const [y, x] = [(proposal >>> 16) - i * spacing, (proposal & 0xffff) - j * spacing];
-      if (n > 0 && level === 0 && !this.wraps && !(y >= 1 && y < this.height - 1 && x >= 1 && x < this.width - 1)) return;
+    for (let n = 0; n < NEIGHBOURS.length; n++) {
+      const [i, j] = NEIGHBOURS[n], proposal = positions[at + i * width + j];
+      const y = (proposal >>> 16) - i * spacing, x = (proposal & 0xffff) - j * spacing;
+      if (n > 0 && level === 0 && !this.wraps && !(y >= 1 && y < this.height - 1 && x >= 1 && x < this.width - 1)) continue;
       const candidate = wrapped(y, this.height) << 16 | wrapped(x, this.width);
-      let cost = 0;
-      DIAGONALS.forEach(([di, dj], e) => {
-        const there = place(candidate, di * spacing, dj * spacing);
+      if (n > 0 && candidate === best) continue;
+      let cost = before ? repetition * this.repeated(spacing, candidate) : 0;
+      for (let e = 0; e < 4; e++) {
+        const there = this.place(candidate, DIAGONALS[e][0] * spacing, DIAGONALS[e][1] * spacing) * dims;
         for (let d = 0; d < dims; d++) {
           const unlike = around[e * dims + d] - 3 * values[there + d];
           cost += unlike * unlike;
         }
-      });
-      if (before) cost += repetition * this.repeated(level, width, before, at, sides, candidate);
+      }
       if (cost < least) [best, least] = [candidate, cost];
-    });
+    }
     return best;
   }
 
+  /** Where the exemplar's texel lies that is so many rows and columns from a position. @param {number} position @param {number} dy @param {number} dx */
+  place(position, dy, dx) {
+    return wrapped((position >>> 16) + dy, this.height) * this.width + wrapped((position & 0xffff) + dx, this.width);
+  }
+
   /**
-   * How many of the sites one side of the exemplar away come from a candidate's row, and how many from its column.
+   * What the sites one side of the exemplar away continue to.
    * @param {number} level @param {number} width @param {Int32Array} before @param {number} at @param {number[]} sides
-   * @param {number} candidate
    */
-  repeated(level, width, before, at, [rows, columns], candidate) {
-    const spacing = 1 << level;
+  lookAtSites(level, width, before, at, [rows, columns]) {
+    for (let n = 0; n < SITES; n++) {
+      const t = (n >> 1) % 3 - 1, sign = (n & 1) * 2 - 1;
+      const [i, j] = n < SITES / 2 ? [sign * rows, t] : [t, sign * columns], site = before[at + i * width + j];
+      this.sites[2 * n] = modulo((site >>> 16) - (i << level), this.height);
+      this.sites[2 * n + 1] = modulo((site & 0xffff) - (j << level), this.width);
+    }
+  }
+
+  /** How many of the sites come from a candidate's row, and how many from its column. @param {number} spacing @param {number} candidate */
+  repeated(spacing, candidate) {
     let count = 0;
-    const look = (/** @type {number} */ i, /** @type {number} */ j) => {
-      const site = before[at + i * width + j];
-      const y = modulo((site >>> 16) - i * spacing, this.height), x = modulo((site & 0xffff) - j * spacing, this.width);
-      const [ay, ax] = [Math.abs(y - (candidate >>> 16)), Math.abs(x - (candidate & 0xffff))];
-      count += Number(2 * Math.min(ay, this.height - ay) <= spacing) + Number(2 * Math.min(ax, this.width - ax) <= spacing);
-    };
-    for (let t = -1; t <= 1; t++) for (const sign of [-1, 1]) {
-      look(sign * rows, t);
-      look(t, sign * columns);
+    for (let n = 0; n < SITES; n++) {
+      const y = Math.abs(this.sites[2 * n] - (candidate >>> 16)), x = Math.abs(this.sites[2 * n + 1] - (candidate & 0xffff));
+      count += Number(2 * Math.min(y, this.height - y) <= spacing) + Number(2 * Math.min(x, this.width - x) <= spacing);
     }
     return count;
   }

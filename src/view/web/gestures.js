@@ -1,9 +1,8 @@
 // Pointers, wheel and keys on the picture.
 
-import { vectorOf } from "./directions.js";
 import { fromDisc, onDisc } from "./dome.js";
 import { LIMITS, viewOf, within } from "./state.js";
-import { turnOf } from "./renderer.js";
+import { screenOf } from "./renderer.js";
 
 /** @typedef {import("./state.js").State} State @typedef {"light" | "turn" | "move"} Drag */
 
@@ -19,7 +18,7 @@ export function moveLight(state, dx, dy, side) {
 /** Turns the surface, or the shape. @param {State} state @param {number} dx @param {number} dy @param {number} side */
 export function turn(state, dx, dy, side) {
   // The direction that is seen moves against the pointer, in the frame of the screen.
-  const [right, up, towards] = turnOf(vectorOf(...state.view)), size = 2.4 / side;
+  const [right, up, towards] = screenOf(state), size = 2.4 / side;
   const view = towards.map((value, axis) => value - dx * size * right[axis] + dy * size * up[axis]);
   const length = Math.hypot(...view), most = state.shape === "plane" ? STEEPEST : LIMITS.theta[1];
   const theta = Math.acos(Math.min(1, Math.max(-1, view[2] / length))) * 180 / Math.PI;
@@ -30,7 +29,7 @@ export function turn(state, dx, dy, side) {
 export function move(state, dx, dy) {
   let [x, y] = [dx, dy];
   if (state.shape === "plane") {
-    const [[a, b], [c, d]] = turnOf(vectorOf(...state.view)), determinant = a * d - b * c;
+    const [[a, b], [c, d]] = screenOf(state), determinant = a * d - b * c;
     [x, y] = [(d * dx + b * dy) / determinant, (c * dx + a * dy) / determinant];
   }
   state.at = [within(state.at[0] - x / state.zoom, LIMITS.at), within(state.at[1] - y / state.zoom, LIMITS.at)];

@@ -37,7 +37,7 @@ class Viewer {
     /** @type {State} */
     this.first = {
       shape: "plane", surface: enlarged ? "enlarged" : appearance ? "endless" : tile.wraps ? "repeated" : "tile", show: "material",
-      light: [42, 125], view: [0, 0], zoom: 2, at: [middle.width / 2, middle.height / 2], scale: 200, exposure: 0, lights: 1, seed: 1,
+      light: [42, 125], view: [0, 0], zoom: 2, at: [Math.floor(middle.width / 2), Math.floor(middle.height / 2)], scale: 200, exposure: 0, lights: 1, seed: 1,
     };
     /** @type {State} */
     this.state = this.allowed(read(location.hash, this.first));
@@ -105,7 +105,8 @@ class Viewer {
 
   /** A zoom at which a shape fills the picture well. @param {Shape} shape */
   fitting(shape) {
-    const side = Math.min(this.canvas.clientWidth, this.canvas.clientHeight);
+    const [x, y] = this.renderer.aside;
+    const side = Math.min(this.canvas.clientWidth - 2 * Math.abs(x), this.canvas.clientHeight - 2 * Math.abs(y));
     return shape === "plane" ? this.first.zoom : (shape === "sphere" ? 0.41 : 0.34) * side / this.state.scale;
   }
 
@@ -120,6 +121,8 @@ class Viewer {
       state.zoom *= state.scale / scale;
       state.scale = scale;
     } else if (name === "shape") {
+      // The unlit side of a curved shape is black: a second light shows it.
+      if ((state.shape === "plane") !== (value === "plane")) state.lights = value === "plane" ? 1 : 2;
       state.shape = /** @type {Shape} */ (value);
       state.view = viewOf(state.shape);
       state.zoom = this.fitting(state.shape);
@@ -156,8 +159,11 @@ class Viewer {
     } else if (name === "save") this.save();
     else if (name === "panel") {
       const isOpen = document.body.classList.toggle("open");
-      document.querySelector("[data-act=panel]")?.setAttribute("aria-expanded", String(isOpen));
-      return;
+      const toggle = element("toggle");
+      toggle.setAttribute("aria-expanded", String(isOpen));
+      toggle.textContent = isOpen ? "Close" : "Controls";
+      this.stand();
+      if (this.state.shape !== "plane") this.state.zoom = this.fitting(this.state.shape);
     }
     this.changed();
     this.rested();
@@ -174,12 +180,20 @@ class Viewer {
     });
   }
 
+  /** Stands a curved shape in the middle of what the controls leave free. */
+  stand() {
+    const panel = element("panel"), isWide = innerWidth > 640;
+    const isOpen = document.body.classList.contains("open");
+    this.renderer.aside = isWide ? [-panel.offsetWidth / 2, 0] : [0, isOpen ? panel.offsetHeight / 2 : 0];
+  }
+
   resize() {
+    this.stand();
     const ratio = Math.min(devicePixelRatio, 2), { clientWidth, clientHeight } = this.canvas;
     const [width, height] = [clientWidth, clientHeight].map(side => Math.max(1, Math.round(side * ratio)));
     if (width === this.canvas.width && height === this.canvas.height) return;
     Object.assign(this.canvas, { width, height });
-    if (!location.hash && this.state.shape !== "plane") this.state.zoom = this.fitting(this.state.shape);
+    if (!/zoom=/.test(location.hash) && this.state.shape !== "plane") this.state.zoom = this.fitting(this.state.shape);
     this.ask();
   }
 

@@ -36,6 +36,19 @@ export function turnOf([x, y, z]) {
   return [[1 - x * x * k, -x * y * k, -x], [-x * y * k, 1 - y * y * k, -y], [x, y, z]];
 }
 
+/**
+ * The screen's right, up and towards the eye, as directions of the surface: the plane is tilted the shortest way, curved
+ * shapes stand upright.
+ * @param {State} state
+ */
+export function screenOf({ shape, view }) {
+  const towards = vectorOf(...view), across = Math.hypot(towards[0], towards[2]);
+  if (shape === "plane" || across < 1e-4) return turnOf(towards);
+  const right = [towards[2] / across, 0, -towards[0] / across];
+  const [x, y, z] = towards;
+  return [right, [y * right[2], z * right[0] - x * right[2], -y * right[0]], towards];
+}
+
 /** Why there can be no picture. */
 export class Unable extends Error {}
 
@@ -86,6 +99,8 @@ export class Renderer {
     /** Part of the pixels that are drawn while something moves and the graphics is slow. */
     this.draft = 1;
     this.drawn = 0;
+    /** How far right and up of the middle a curved shape stands, pixels of the page. */
+    this.aside = [0, 0];
   }
 
   /** @param {number} side @param {number} limit */
@@ -176,7 +191,7 @@ export class Renderer {
     const { canvas } = this, atlas = this.atlasOf(state);
     const width = Math.max(1, Math.round(canvas.width * draft)), height = Math.max(1, Math.round(canvas.height * draft));
     const ratio = canvas.width / Math.max(1, canvas.clientWidth) * draft, pixels = state.zoom * ratio;
-    const turn = turnOf(vectorOf(...state.view));
+    const turn = screenOf(state);
     const isFlat = state.shape === "plane", isEndless = state.surface === "endless" && !!this.plane;
     const [[a, b], [c, d]] = turn, determinant = a * d - b * c;
     // A texel's place for a pixel's: rows of the tile run downwards.
@@ -205,7 +220,7 @@ export class Renderer {
     const { gl, canvas } = this;
     let isMore = this.options.plain && isMoving ? true : this.work(state, isMoving);
     const draft = isMoving ? this.draft : 1;
-    const seen = JSON.stringify([state, canvas.width, canvas.height, draft, this.tiles?.last, !this.tiles]);
+    const seen = JSON.stringify([state, canvas.width, canvas.height, draft, this.aside, this.tiles?.last, !this.tiles]);
     if (seen !== this.seen) {
       this.seen = seen;
       this.samples = 0;
@@ -267,7 +282,8 @@ export class Renderer {
     const shown = this.geometry(state, draft), { atlas, isFlat, isEndless, level, step, whole, exemplar } = shown;
     const isLit = state.show === "material";
     const colors = isFlat || !isLit ? this.color(atlas, state, level) : this.tile.index;
-    const middle = [shown.width / 2, shown.height / 2].map((half, axis) => half - (pick ? pick[axis] : 0));
+    const middle = [shown.width, shown.height].map((side, axis) =>
+      side / 2 + (isFlat ? 0 : this.aside[axis] * shown.ratio) - (pick ? pick[axis] : 0));
     const common = {
       surface: isEndless ? 0 : state.surface === "repeated" ? 1 : 2, level, levels: shown.levels, whole: whole.map(place => place | 0),
       period: whole.map((place, axis) => modulo(place * step - exemplar[axis], exemplar[2 + axis])), exemplar,

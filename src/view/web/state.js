@@ -24,7 +24,7 @@ export const LIMITS = {
 
 /** How a shape is shown at first. @param {Shape} shape @returns {[number, number]} */
 export function viewOf(shape) {
-  return shape === "box" ? [40, 60] : shape === "cylinder" ? [24, 90] : [0, 0];
+  return shape === "box" ? [42, 140] : shape === "cylinder" ? [24, 90] : [0, 0];
 }
 
 /** @param {number} number @param {number[]} limits */

@@ -145,10 +145,10 @@ impl Mesh {
         stack.push(0);
         while let Some(node) = stack.pop() {
             match self.tree.nodes.get(node) {
-                Some(BvhNode::Leaf { shape_index, .. }) => {
-                    if self.triangles.get(*shape_index).is_some_and(&mut look) {
-                        return;
-                    }
+                Some(BvhNode::Leaf { shape_index, .. })
+                    if self.triangles.get(*shape_index).is_some_and(&mut look) =>
+                {
+                    return;
                 }
                 Some(BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. }) => {
                     if query.intersects_aabb(child_l_aabb) {
@@ -158,7 +158,7 @@ impl Mesh {
                         stack.push(*child_r_index);
                     }
                 }
-                None => {}
+                Some(BvhNode::Leaf { .. }) | None => {}
             }
         }
     }

@@ -217,7 +217,7 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
         beyond |= rendered.beyond;
         report
             .pictures
-            .push((path.clone(), write(rendered.picture, options.exposure, &path, encoding, context)?));
+            .push((path.clone(), write(&rendered.picture, options.exposure, &path, encoding, context)?));
     }
     context.progress.end();
     if beyond {
@@ -232,7 +232,7 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
 
 /// Writes a picture, its linear values times an exposure.
 pub(super) fn write(
-    picture: Picture,
+    picture: &Picture,
     exposure: f64,
     path: &Path,
     encoding: Encoding,

@@ -113,7 +113,7 @@ pub fn compare(
     canvas.text(top, left, "the tile, a pixel a texel");
     let tile = exposed(subject.flat_tile()?, options.exposure);
     canvas.put(top + LINE, left, &tile.as_display());
-    let made = super::write(canvas.into_picture(), 1.0, output, encoding, context)?;
+    let made = super::write(&canvas.into_picture(), 1.0, output, encoding, context)?;
     Ok(Report { pictures: vec![(output.to_owned(), made)], size: sheet, notes })
 }
 

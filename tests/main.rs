@@ -78,6 +78,8 @@ mod readme;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/rendering.rs"]
+mod rendering;
 #[path = "behaviour/safety.rs"]
 mod safety;
 #[path = "behaviour/setup.rs"]
@@ -90,3 +92,5 @@ mod slurm;
 mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;
+#[path = "behaviour/viewer.rs"]
+mod viewer;

@@ -25,6 +25,7 @@ mod number;
 mod outputs;
 mod pack;
 mod progress;
+mod render;
 mod sample;
 mod scene;
 mod slurm;
@@ -34,6 +35,7 @@ mod table;
 mod terminal;
 mod tile;
 mod verify;
+mod view;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -139,6 +141,8 @@ enum Command {
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Render(render::Render),
+    View(view::View),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
@@ -318,6 +322,8 @@ impl Command {
             Self::Unpack(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
+            Self::Render(command) => command.run(given, context, console),
+            Self::View(command) => command.run(context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
             Self::Man(command) => command.run(console),

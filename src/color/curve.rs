@@ -12,6 +12,10 @@ use super::{Transfer, srgb_decode};
 /// White on the curve.
 pub(crate) const WHITE: f32 = 255.0;
 
+/// The largest value, in both directions: 65 thousand times as bright as white is no reflectance, and sums of products
+/// must stay finite.
+const LARGEST: f32 = (1 << 24) as f32;
+
 /// From samples to the curve.
 pub(crate) struct Curve {
     /// The value of each sample, of those types whose samples are few.
@@ -61,7 +65,7 @@ fn on_curve(sample: f64, transfer: Transfer) -> f32 {
         Transfer::Linear => Transfer::Srgb.encode(sample),
     };
     let value = (f64::from(WHITE) * value) as f32;
-    if value.is_finite() { value } else { 0.0 }
+    if value.is_finite() { value.clamp(-LARGEST, LARGEST) } else { 0.0 }
 }
 
 /// Values as samples of a type: rounded, and within what it holds.
@@ -113,9 +117,9 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_black() {
-        let mut values = [1.0; 3];
-        let given = Samples::F32(vec![f32::NAN, f32::INFINITY, 0.5]);
-        Curve::new(SampleType::F32, Transfer::Srgb).values(&given, 0..3, &mut values);
-        assert_eq!(values, [0.0, 0.0, 127.5]);
+        let mut values = [1.0; 4];
+        let given = Samples::F32(vec![f32::NAN, f32::INFINITY, 0.5, -3e30]);
+        Curve::new(SampleType::F32, Transfer::Srgb).values(&given, 0..4, &mut values);
+        assert_eq!(values, [0.0, 0.0, 127.5, -LARGEST]);
     }
 }

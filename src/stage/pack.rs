@@ -106,8 +106,8 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     let model = Model::open(&options.model)?;
     let report: ComponentsReport =
         of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
-    // Values are packed in f64, beside whole numbers and what is known of them.
-    context.require("packing components", 12 * model.components_bytes()?)?;
+    // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
+    context.require("packing components", 5 * model.components_bytes()?)?;
     let whole = unpacked_model(&model, options)?;
     let target = match options.quality {
         Quality::Bytes(bytes) => packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),

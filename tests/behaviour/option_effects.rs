@@ -58,6 +58,7 @@ const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
 const OF_COMPONENTS: Shown =
     Unseen("of a model with components, which the fixture has not; components.rs tries it");
+const OF_A_FILE: Shown = Unseen("of a file that a test makes; rendering.rs tries it");
 
 /// The options of every command that reads archives. What they do to the result is seen in the recipes of import; for
 /// stores they are refused.
@@ -118,6 +119,19 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
             ("pieces", Unseen("of archives in pieces")),
             ("picture", Shows(&["--picture", "{new}/p.png"], &[])),
             ("json", Shows(&["--json"], &[])),
+        ],
+    },
+    Outputs {
+        command: "view",
+        base: &["{model}", "--export", "{new}/p.html"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("export", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("window", Unseen("of enlargements; viewer.rs tries it")),
+            ("port", Unseen("of the server; viewer.rs tries it")),
+            ("open", Unseen("starts a browser")),
         ],
     },
     Outputs {
@@ -258,6 +272,47 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "render",
+        base: &["{model}", "--out", "{new}/r.png", "--size", "24x20"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("out", Unseen("the name of the result, and its format")),
+            ("size", Shows(&["--size", "25x20"], &[])),
+            ("shape", Shows(&["--shape", "cylinder"], &[])),
+            ("mesh", OF_A_FILE),
+            ("scale", Shows(&["--scale", "2"], &[])),
+            ("light", Shows(&["--light", "30,90"], &[])),
+            ("point_light", Shows(&["--point-light", "1,2,3"], &[])),
+            ("environment", OF_A_FILE),
+            ("environment_turn", OF_A_FILE),
+            ("environment_lights", OF_A_FILE),
+            ("show_environment", OF_A_FILE),
+            ("background", Shows(&["--background", "0.5"], &[])),
+            ("no_shadows", Shows(&["--shape", "interior", "--no-shadows"], &["--shape", "interior"])),
+            ("eye", Shows(&["--eye", "1,2,4"], &[])),
+            ("target", Shows(&["--target", "0.5,0,0"], &[])),
+            ("up", Shows(&["--up", "1,1,0"], &[])),
+            ("fov", Shows(&["--fov", "40"], &[])),
+            ("orthographic", Shows(&["--orthographic"], &[])),
+            ("samples", Shows(&["--samples", "1"], &[])),
+            ("exposure", Shows(&["--exposure", "2"], &[])),
+            ("quality", Shows(&["--out", "{new}/r.jpg", "--quality", "50"], &["--out", "{new}/r.jpg"])),
+            ("frames", Shows(&["--frames", "2", "--turntable"], &[])),
+            ("turntable", Shows(&["--frames", "2", "--turntable"], &["--frames", "2", "--light-sweep"])),
+            ("light_sweep", Shows(&["--frames", "2", "--light-sweep"], &["--frames", "2", "--turntable"])),
+            (
+                "shard",
+                Shows(&["--frames", "2", "--turntable", "--shard", "0/2"], &["--frames", "2", "--turntable"]),
+            ),
+            ("plane", Shows(&["--plane"], &[])),
+            ("seed", Shows(&["--plane", "--seed", "2"], &["--plane"])),
+            ("jitter", Shows(&["--plane", "--jitter", "0"], &["--plane"])),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("compare", Shows(&["--compare"], &[])),
+        ],
+    },
+    Outputs {
         command: "judge",
         base: &["{enlarged}", "--against", "{measurement}", "--crop", "16", "--pair", "0,1"],
         reads: false,
@@ -293,6 +348,10 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (&["image", "{model}", "--out", "{new}/x.png", "--seed", "2"], "--plane"),
     (&["image", "{model}", "--out", "{new}/x.png", "--jitter", "1"], "--plane"),
     (&["image", "{measurement}", "--out", "{new}/x.png", "--plane", "--window", "0,0,9,9"], "plane"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--quality", "50"], "--quality"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--shape", "flat", "--eye", "1,2,3"], "--eye"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--shape", "flat", "--background", "0"], "--background"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--no-shadows"], "--no-shadows"),
     (&["compare", "{model}", "{measurement}", "--light", "30,0"], "--picture"),
     (&["compare", "{model}", "{measurement}", "--view", "30,0"], "--picture"),
     (&["judge", "{enlarged}", "--against", "{measurement}", "--size", "64x64"], "--size"),

@@ -85,7 +85,7 @@ fn elevations_are_found_and_read_as_what_they_are() {
         let told = import(&named, &store, &options);
         assert!(told.contains(&format!("read with {repair}")), "{told}");
         let mended = Measurement::open(&store).unwrap();
-        let [a, b] = [&right, &mended].map(|store| store.description());
+        let [a, b] = [&right, &mended].map(Measurement::description);
         assert_eq!([sorted(&a.views), sorted(&a.lights)], [sorted(&b.views), sorted(&b.lights)]);
         // The image of a pair is that of the pair.
         let [view, light] = [a.views[7], a.lights[9]];
@@ -142,7 +142,8 @@ fn advised(told: &str) -> Vec<String> {
 #[test]
 fn what_a_missing_picture_spoils_can_be_left_out_by_the_option_that_is_advised() {
     let plain = |of: &ImageName| labels(of, of.light.theta_deg(), of.view.theta_deg());
-    let missing: [(&str, fn(usize, usize) -> bool, &str); 4] = [
+    type Case = (&'static str, fn(usize, usize) -> bool, &'static str);
+    let missing: [Case; 4] = [
         ("one picture", |view, light| (view, light) == (3, 2), "--drop-view 3"),
         ("some of a view", |view, light| view == 3 && light > 2, "--drop-view 3"),
         ("some of a light", |view, light| light == 2 && view % 2 == 0, "--drop-light 2"),

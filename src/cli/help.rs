@@ -18,11 +18,15 @@ use super::terminal::{of_output, pieces};
 use super::{Cli, Console};
 
 /// Commands by what they are for, in the order of the work.
-const GROUPS: [(&str, &[&str]); 8] = [
+const GROUPS: [(&str, &[&str]); 9] = [
     ("Try", &["demo", "sample"]),
     ("Convert", &["import", "export"]),
     ("Check", &["info", "check", "verify"]),
-    ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
+    (
+        "Model",
+        &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "components", "compare"],
+    ),
+    ("Ship", &["pack", "unpack"]),
     ("Enlarge", &["enlarge", "judge"]),
     ("Look", &["image", "render", "view"]),
     ("Share work", &["slurm", "status", "missing"]),

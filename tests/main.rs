@@ -43,6 +43,8 @@ mod equations;
 mod examples;
 #[path = "behaviour/fixture.rs"]
 mod fixture;
+#[path = "behaviour/forged_stores.rs"]
+mod forged_stores;
 #[path = "behaviour/input_words.rs"]
 mod input_words;
 #[path = "behaviour/interruption.rs"]
@@ -74,6 +76,8 @@ mod readme;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/resident_memory.rs"]
+mod resident_memory;
 #[path = "behaviour/safety.rs"]
 mod safety;
 #[path = "behaviour/setup.rs"]

@@ -78,9 +78,8 @@ impl Check {
             given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
-            // One that was made by an older version, or crafted, may not say how it was read.
-            let reading = measurement.recipe().reading.clone();
-            report.beside(&serde_json::from_value(reading).unwrap_or_default());
+            let reading = measurement.recipe().how_read().map_err(Error::input)?;
+            report.beside(&reading.adaptation);
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;

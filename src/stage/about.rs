@@ -244,10 +244,10 @@ fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled>
             .transpose()?
             .map(|recipe| recipe.measurement),
         tile: is_there(Stage::Tile).then(|| model.tile_report()).transpose()?,
-        cluster: is_there(Stage::Cluster).then(|| model.report(Stage::Cluster)).transpose()?,
-        normals: is_there(Stage::Normals).then(|| model.report(Stage::Normals)).transpose()?,
-        field: is_there(Stage::Fit).then(|| model.report(Stage::Fit)).transpose()?,
-        appearance: is_there(Stage::Appearance).then(|| model.report(Stage::Appearance)).transpose()?,
+        cluster: is_there(Stage::Cluster).then(|| model.cluster_report()).transpose()?,
+        normals: is_there(Stage::Normals).then(|| model.normals_report()).transpose()?,
+        field: is_there(Stage::Fit).then(|| model.field_report()).transpose()?,
+        appearance: is_there(Stage::Appearance).then(|| model.appearance_report()).transpose()?,
         stages,
     })
 }

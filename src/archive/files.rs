@@ -141,8 +141,9 @@ impl Files {
                 Location::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
                 Location::Zipped { .. } => self.bytes(number).ok()?,
             };
-            let (what, way_out) = picture::foreign(self.name(number), &head)?;
+            let found = picture::foreign(self.name(number), &head);
             self.release(number);
+            let (what, way_out) = found?;
             Some(format!("{} is {what}, which is not read: {way_out}", self.shown(number)))
         };
         (0..self.len().min(SNIFFED)).find_map(told)

@@ -14,7 +14,7 @@ use crate::run::Context;
 pub struct Trial {
     /// Clusters.
     pub clusters: usize,
-    /// Weighted mean |dL*| of the texels from their centres.
+    /// Weighted mean |dL*| of the texels from their centres; in a search for an error, from the representatives.
     pub mean_lightness_error: f64,
 }
 
@@ -82,7 +82,11 @@ impl<'a> Trials<'a> {
         loop {
             let clustering = self.run(clusters, context)?;
             let found = clustering.nearest.len();
-            if self.stored_error(&clustering, context) <= target {
+            let error = self.stored_error(&clustering, context);
+            if let Some(trial) = self.found.last_mut() {
+                trial.mean_lightness_error = error;
+            }
+            if error <= target {
                 enough = Some(clustering);
             } else {
                 too_few = clusters;

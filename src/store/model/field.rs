@@ -313,14 +313,6 @@ fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
         (kind == CarKind::Car2d).then(|| square("mrf/transform", &transform_layout(channels))).transpose()?;
     let covariance = square("mrf/covariance", &square_layout(channels))?;
     let gains = store.read_array::<f64>("mrf/gain", &gain_layout(report.levels.len()))?;
-    if let Some(k) = report.levels.iter().zip(&gains).position(|(level, gain)| level.gain != *gain) {
-        let (found, expected) = (report.levels[k].gain, gains[k]);
-        return Err(Error::input(format!(
-            "{}: report of fit: level {k}: gain: got {found}, mrf/gain has {expected}",
-            store.path().display()
-        ))
-        .hint("make the model anew, under another name"));
-    }
     let levels = report
         .levels
         .iter()
@@ -335,6 +327,15 @@ fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
             .context(store.path().display())
             .hint("the field is damaged: make the model anew, under another name")
     })?;
+    if let Some(k) = report.levels.iter().zip(&field.levels).position(|(told, level)| told.gain != level.gain)
+    {
+        let (found, expected) = (report.levels[k].gain, field.levels[k].gain);
+        return Err(Error::input(format!(
+            "{}: report of fit: level {k}: gain: got {found}, mrf/gain has {expected}",
+            store.path().display()
+        ))
+        .hint("make the model anew, under another name"));
+    }
     let read_marginals = |matching| {
         let values = store.read_array::<f32>("mrf/marginals", &marginals_layout())?;
         let table = values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();

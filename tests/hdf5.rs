@@ -201,6 +201,24 @@ fn a_file_appears_whole_or_not_at_all() {
     assert_eq!(files(), 0);
 }
 
+#[test]
+fn integers_of_fewer_bits_than_their_type_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.h5");
+    let contents = contents(Size::new(16, 16), 1, 2, &["Y"], SampleType::U16);
+    write(&path, &contents, false);
+    assert!(open(&path).unwrap().contents().assumptions.is_empty());
+    // A type message of unsigned 16-bit integers: size 2, offset 0, precision 16.
+    let mut bytes = std::fs::read(&path).unwrap();
+    let message = [0x10, 0, 0, 0, 2, 0, 0, 0, 0, 0, 16, 0];
+    let places: Vec<usize> = (0..bytes.len() - 12).filter(|&at| bytes[at..at + 12] == message).collect();
+    assert!(!places.is_empty());
+    places.into_iter().for_each(|at| bytes[at + 10] = 12);
+    std::fs::write(&path, bytes).unwrap();
+    let found = open(&path).unwrap();
+    assert!(found.contents().assumptions[0].contains("precision of reflectance"));
+}
+
 /// A list of images in an order of its own, as h5py leaves it without being asked for anything.
 fn image_list(path: &Path, views: usize, lights: usize) -> File {
     image_list_as(path, views, lights, |file, color| dataset(file, "ground_color", color))

@@ -70,6 +70,8 @@ mod picture_formats;
 mod pictures;
 #[path = "behaviour/places.rs"]
 mod places;
+#[path = "behaviour/reading.rs"]
+mod reading;
 #[path = "behaviour/readme.rs"]
 mod readme;
 #[path = "behaviour/real_data.rs"]

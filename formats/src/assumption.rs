@@ -12,6 +12,8 @@ pub enum About {
     Cosine,
     /// Where azimuths begin, and which way they run.
     Azimuths,
+    /// The directions of the views, which the archive does not give.
+    Views,
     /// Anything else.
     Other,
 }
@@ -39,6 +41,11 @@ impl Assumption {
     /// About azimuths.
     pub fn azimuths(text: impl Into<String>) -> Self {
         Self { about: About::Azimuths, text: text.into() }
+    }
+
+    /// About the directions of the views.
+    pub fn views(text: impl Into<String>) -> Self {
+        Self { about: About::Views, text: text.into() }
     }
 }
 

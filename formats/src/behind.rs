@@ -84,6 +84,10 @@ const IN_NUMBERS: [&str; 17] = [
     "virgule", "e", "x", "times",
 ];
 
+/// Numbers in words, which are a fraction behind a word for the decimal point: `4_point_five`.
+const NUMBERS: [&str; 13] =
+    ["zero", "oh", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "half", "quarter"];
+
 /// Marks behind which other words may stand.
 const MARKS: &str = "_- \t,;.:|=+()[]{}<>#@~&/\\\u{2013}\u{2014}\u{a0}";
 
@@ -145,7 +149,13 @@ pub(crate) fn names_another_unit(text: &str) -> bool {
 fn is_part_of_number(text: &str) -> bool {
     let (word, after) = first_word(text);
     let digits = after.trim_start_matches(['_', '-', ' ', '.']).starts_with(char::is_numeric);
-    is_other_unit(&word) || digits && IN_NUMBERS.contains(&word.as_str())
+    let next = first_word(after.trim_start_matches(['_', '-', ' ', '.'])).0;
+    let in_words = NUMBERS.contains(&next.as_str());
+    let fraction = |word: &str| ["half", "quarter"].contains(&word);
+    is_other_unit(&word)
+        || (digits || in_words) && IN_NUMBERS.contains(&word.as_str())
+        || fraction(&word)
+        || word == "and" && (in_words || next == "a")
 }
 
 /// Whether a number is no part of the angle before it: a whole one right behind a bracket, as that of a copy is, `(2)`

@@ -1,9 +1,10 @@
 //! Which file is the image of which view and light, and what is missing.
 
+use std::collections::HashMap;
 use std::fmt;
 
 use crate::words::counted;
-use crate::{Angles, six_digits};
+use crate::{Angles, azimuth_digits, six_digits};
 
 /// Missing pairs that are listed one by one; more are only counted, since a few names can lack millions.
 const MAX_LISTED: usize = 1 << 16;
@@ -17,7 +18,7 @@ const MAX_NAMES_SHOWN: usize = 4;
 /// Directions nearer to each other than this are one: sets write them with few digits, or as vectors.
 const SAME_RAD: f64 = 1e-6;
 
-/// A complete set of images: one for every view and light.
+/// A complete set of images: one for every view and light, but for those that are left out.
 ///
 /// Views and lights are sorted by theta, then phi; the published sets are numbered in that order. Directions
 /// less than a millionth radian apart are one, and so are thetas in the sorting. All views
@@ -26,9 +27,21 @@ const SAME_RAD: f64 = 1e-6;
 pub struct Catalogue {
     views: Vec<Angles>,
     lights: Vec<Angles>,
-    /// Position in the list of names, `[view][light]`.
+    /// Number of each view and of each light among those that are not left out.
+    kept: [Vec<Option<usize>>; 2],
+    /// Position in the list of names, `[view][light]`, of those that are not left out.
     images: Vec<usize>,
     ignored: usize,
+}
+
+/// Views and lights that need no images, by their numbers in the sorted lists of all directions that names give.
+/// Numbers that there are none of say nothing.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Without {
+    /// Views.
+    pub views: Vec<usize>,
+    /// Lights.
+    pub lights: Vec<usize>,
 }
 
 /// One view and one light.
@@ -43,8 +56,8 @@ pub struct Pair {
 impl fmt::Display for Pair {
     /// As in file names, in degrees without leading zeros, to six digits.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (tl, pl) = (six_digits(self.light.theta_deg()), six_digits(self.light.phi_deg()));
-        let (tv, pv) = (six_digits(self.view.theta_deg()), six_digits(self.view.phi_deg()));
+        let (tl, pl) = (six_digits(self.light.theta_deg()), azimuth_digits(self.light.phi_deg()));
+        let (tv, pv) = (six_digits(self.view.theta_deg()), azimuth_digits(self.view.phi_deg()));
         write!(f, "tl{tl} pl{pl} tv{tv} pv{pv}")
     }
 }
@@ -78,6 +91,11 @@ pub struct CatalogueErrors {
     pub duplicates: Vec<Duplicate>,
     /// Names of images that are the only one of their light or view, where others have more: they may be misnamed.
     pub lone: Vec<String>,
+    /// A few views and lights, with their directions, without which the set would be complete; none where many would
+    /// have to go.
+    pub spare_views: Vec<(usize, Angles)>,
+    /// The lights among them.
+    pub spare_lights: Vec<(usize, Angles)>,
 }
 
 impl Catalogue {
@@ -101,6 +119,30 @@ impl Catalogue {
     pub fn from_pairs<'a>(
         files: impl IntoIterator<Item = (&'a str, Option<Pair>)>,
     ) -> Result<Catalogue, Box<CatalogueErrors>> {
+        Catalogue::from_pairs_without(files, &Without::default())
+    }
+
+    /// The same, but nothing is missing of the views and lights that are left out, nor too often there. They keep their
+    /// numbers, so those of the others stay what they are.
+    ///
+    /// ```
+    /// use btfkit_formats::{Angles, Catalogue, Pair, Without};
+    ///
+    /// let pair = |view, light| Some(Pair { view: Angles::new(view, 0.0)?, light: Angles::new(light, 0.0)? });
+    /// let files = [("a", pair(0.0, 15.0)), ("b", pair(0.0, 30.0)), ("c", pair(45.0, 30.0))];
+    /// assert!(Catalogue::from_pairs(files).is_err());
+    /// let set = Catalogue::from_pairs_without(files, &Without { views: vec![1], lights: vec![] }).unwrap();
+    /// assert_eq!((set.views().len(), set.images()), (2, &[0, 1][..]));
+    /// assert_eq!(set.image(1, 1), None);
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// As of [`Catalogue::from_pairs`]; or that nothing is left.
+    pub fn from_pairs_without<'a>(
+        files: impl IntoIterator<Item = (&'a str, Option<Pair>)>,
+        without: &Without,
+    ) -> Result<Catalogue, Box<CatalogueErrors>> {
         let mut ignored = 0usize;
         let mut named: Vec<(usize, &str)> = Vec::new();
         let (mut views, mut lights) = (Vec::new(), Vec::new());
@@ -119,6 +161,13 @@ impl Catalogue {
         let mut found: Vec<(Cell, usize, &str)> =
             cells.zip(named).map(|(cell, (position, name))| (cell, position, name)).collect();
         found.sort_unstable_by_key(|&(cell, position, _)| (cell, position));
+        let kept = [kept(views.len(), &without.views), kept(lights.len(), &without.lights)];
+        let [of_views, of_lights] = &kept;
+        let is_kept = |(view, light): Cell| {
+            let is = |of: &[Option<usize>], number: usize| of.get(number).is_some_and(Option::is_some);
+            is(of_views, view) && is(of_lights, light)
+        };
+        found.retain(|&(cell, ..)| is_kept(cell));
 
         let groups = || found.chunk_by(|(a, ..), (b, ..)| a == b);
         let pair = |(view, light): Cell| Some(Pair { view: *views.get(view)?, light: *lights.get(light)? });
@@ -129,26 +178,39 @@ impl Catalogue {
                 Some(Duplicate { pair: pair(group.first()?.0)?, names })
             })
             .collect();
-        let cells = count(views.len()).saturating_mul(count(lights.len()));
+        let [kept_views, kept_lights] = [of_views, of_lights].map(|of| {
+            (0..of.len()).filter(|&number| of.get(number).is_some_and(Option::is_some)).collect::<Vec<_>>()
+        });
+        let cells = count(kept_views.len()).saturating_mul(count(kept_lights.len()));
         let missing_count = cells.saturating_sub(count(groups().count()));
         if found.is_empty() || missing_count > 0 || !duplicates.is_empty() {
             let present = groups().filter_map(|group| Some(group.first()?.0));
             let listed = usize::try_from(missing_count).unwrap_or(usize::MAX).min(MAX_LISTED);
-            let missing = gaps(views.len(), lights.len(), present).take(listed).filter_map(pair).collect();
+            let gaps: Vec<Cell> = gaps(&kept_views, &kept_lights, present).take(listed).collect();
+            let doubled = groups().filter(|group| group.len() > 1).filter_map(|group| Some(group.first()?.0));
+            let faults: Vec<Cell> = gaps.iter().copied().chain(doubled).collect();
+            let all_listed = count(gaps.len()) == missing_count;
+            let spare = if all_listed { spare(faults, kept_views.len(), kept_lights.len()) } else { None };
+            let Without { views: spare_views, lights: spare_lights } = spare.unwrap_or_default();
+            let named = |numbers: Vec<usize>, of: &[Angles]| {
+                numbers.into_iter().filter_map(|number| Some((number, *of.get(number)?))).collect()
+            };
             return Err(Box::new(CatalogueErrors {
-                views: views.len(),
-                lights: lights.len(),
+                views: kept_views.len(),
+                lights: kept_lights.len(),
                 images: found.len(),
                 ignored,
-                missing,
+                missing: gaps.into_iter().filter_map(pair).collect(),
                 missing_count,
                 duplicates,
                 lone: lone(&found, views.len(), lights.len()),
+                spare_views: named(spare_views, &views),
+                spare_lights: named(spare_lights, &lights),
             }));
         }
         // Complete and sorted by view, then light: the list is the grid.
         let images = found.iter().map(|&(_, position, _)| position).collect();
-        Ok(Catalogue { views, lights, images, ignored })
+        Ok(Catalogue { views, lights, kept, images, ignored })
     }
 
     /// Directions of the views, sorted.
@@ -162,13 +224,22 @@ impl Catalogue {
     }
 
     /// Position, in the list that the catalogue was made from, of the image of view number `view` and light
-    /// number `light`; `None` if there is no such view or light.
+    /// number `light`; `None` if there is no such view or light, or one of them is left out.
     pub fn image(&self, view: usize, light: usize) -> Option<usize> {
-        if light >= self.lights.len() {
-            return None;
-        }
-        let at = view.checked_mul(self.lights.len())?.checked_add(light)?;
-        self.images.get(at).copied()
+        self.images.get(self.place(view, light)?).copied()
+    }
+
+    /// Where the image of a view and a light stands in [`Catalogue::images`].
+    pub fn place(&self, view: usize, light: usize) -> Option<usize> {
+        let [views, lights] = &self.kept;
+        let view = (*views.get(view)?)?;
+        let light = (*lights.get(light)?)?;
+        view.checked_mul(lights.iter().flatten().count())?.checked_add(light)
+    }
+
+    /// Positions of all images, by view, then light, of those that are not left out.
+    pub fn images(&self) -> &[usize] {
+        &self.images
     }
 
     /// How many files were not images.
@@ -261,10 +332,61 @@ fn lone(found: &[(Cell, usize, &str)], views: usize, lights: usize) -> Vec<Strin
 }
 
 /// The cells of the grid that are not in `present`, which is sorted and a part of the grid.
-fn gaps(views: usize, lights: usize, present: impl Iterator<Item = Cell>) -> impl Iterator<Item = Cell> {
-    let grid = (0..views).flat_map(move |view| (0..lights).map(move |light| (view, light)));
+fn gaps(
+    views: &[usize],
+    lights: &[usize],
+    present: impl Iterator<Item = Cell>,
+) -> impl Iterator<Item = Cell> {
+    let grid = views.iter().flat_map(move |&view| lights.iter().map(move |&light| (view, light)));
     let mut present = present.peekable();
     grid.filter(move |cell| present.next_if_eq(cell).is_none())
+}
+
+/// The number of each direction among those that are not left out.
+fn kept(count: usize, without: &[usize]) -> Vec<Option<usize>> {
+    let mut next = 0usize;
+    let number = |at| {
+        if without.contains(&at) {
+            return None;
+        }
+        let number = next;
+        next = next.saturating_add(1);
+        Some(number)
+    };
+    (0..count).map(number).collect()
+}
+
+/// Views and lights without which none of these cells is left, most faults first; none where more than a few are
+/// needed, or nothing would be left.
+fn spare(mut faults: Vec<Cell>, views: usize, lights: usize) -> Option<Without> {
+    const A_FEW: usize = 6;
+    let mut spare = Without::default();
+    while !faults.is_empty() {
+        let most = |numbers: &mut dyn Iterator<Item = usize>| {
+            let mut counts: HashMap<usize, usize> = HashMap::new();
+            numbers.for_each(|number| {
+                let count = counts.entry(number).or_default();
+                *count = count.saturating_add(1);
+            });
+            // Of equal ones the first, whatever the order in the map.
+            counts.into_iter().max_by_key(|&(number, count)| (count, std::cmp::Reverse(number)))
+        };
+        let view = most(&mut faults.iter().map(|cell| cell.0))?;
+        let light = most(&mut faults.iter().map(|cell| cell.1))?;
+        // Where one picture is missing, it costs fewer images to leave out its view if there are more views.
+        if (view.1, views) >= (light.1, lights) {
+            spare.views.push(view.0);
+            faults.retain(|cell| cell.0 != view.0);
+        } else {
+            spare.lights.push(light.0);
+            faults.retain(|cell| cell.1 != light.0);
+        }
+        let too_many = spare.views.len().saturating_add(spare.lights.len()) > A_FEW;
+        if too_many || spare.views.len() >= views || spare.lights.len() >= lights {
+            return None;
+        }
+    }
+    Some(spare)
 }
 
 fn count(n: usize) -> u64 {

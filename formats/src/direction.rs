@@ -53,10 +53,20 @@ pub fn six_digits(value: f64) -> f64 {
     format!("{decimals:.5e}").parse().unwrap_or(decimals) + 0.0
 }
 
+/// An azimuth in degrees for people, as [`six_digits`]: what rounds to a whole turn is 0.
+///
+/// ```
+/// assert_eq!(btfkit_formats::azimuth_digits(359.9999999), 0.0);
+/// ```
+pub fn azimuth_digits(phi_deg: f64) -> f64 {
+    let phi = six_digits(phi_deg);
+    if phi.abs() == 360.0 { 0.0 } else { phi }
+}
+
 impl std::fmt::Display for Direction {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (theta, phi) = self.degrees();
-        write!(f, "theta {} phi {}", six_digits(theta), six_digits(phi))
+        write!(f, "theta {} phi {}", six_digits(theta), azimuth_digits(phi))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The numbers that name a direction in file name patterns and in the columns of tables.
 
-use crate::{Angles, Pair};
+use crate::{Angles, Doubt, Pair};
 
 /// One number of one direction: `theta_i`, `phi_i`, `x_i`, `y_i`, `z_i` of the light, `theta_v` ... of the
 /// view.
@@ -132,6 +132,29 @@ impl Forms {
         };
         let view = self.view.map_or(Ok(Angles::FRONTAL), |form| angles(Side::View, form))?;
         Ok(Pair { view, light: angles(Side::Light, self.light)? })
+    }
+}
+
+impl Forms {
+    /// What is odd about both directions, from the values of the fields; angles in degrees.
+    pub(crate) fn doubt(self, value: impl Fn(Field) -> Option<f64>) -> Option<Doubt> {
+        let of = |side, form| {
+            let get = |component| value(Field { side, component }).unwrap_or(f64::NAN);
+            match form {
+                Form::Polar => Doubt::of_angles(get(Component::Theta), get(Component::Phi)),
+                Form::Vector => {
+                    let vector = VECTOR.map(get);
+                    let expected = Angles::from_vector(vector).err()?;
+                    Some(Doubt::Impossible(format!("the vector {vector:?}, which is not {expected}")))
+                }
+            }
+        };
+        let view = self.view.and_then(|form| of(Side::View, form));
+        let light = of(Side::Light, self.light);
+        match light {
+            Some(light) => Some(light.or_worse(view)),
+            None => view,
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Mending what is known to be wrong with an archive while it is read: directions that are mirrored, turned or
-//! exchanged, images that are transposed, a cosine that is missing, samples of an unwanted type.
+//! exchanged, elevations in the place of polar angles, images that are transposed, a cosine that is missing, samples of
+//! an unwanted type.
 
 use std::ops::Range;
 use std::path::Path;
@@ -12,16 +13,33 @@ use crate::color::{LightnessCodes, Remarkable, Transfer};
 use crate::error::{Error, Result};
 use crate::run::Context;
 
-/// Which azimuths run the wrong way round.
+/// Whose directions are meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Mirrored {
-    /// Of lights and views.
+pub enum Side {
+    /// Those of lights and views.
     Both,
-    /// Of lights.
+    /// Those of lights.
     Lights,
-    /// Of views.
+    /// Those of views.
     Views,
+}
+
+impl Side {
+    /// The side that is lights, or views, or both; none of neither.
+    pub fn of(lights: bool, views: bool) -> Option<Self> {
+        match (lights, views) {
+            (true, true) => Some(Self::Both),
+            (true, false) => Some(Self::Lights),
+            (false, true) => Some(Self::Views),
+            (false, false) => None,
+        }
+    }
+
+    /// Whether lights, and whether views are meant.
+    pub fn lights_and_views(side: Option<Self>) -> [bool; 2] {
+        [Self::Lights, Self::Views].map(|one| side.is_some_and(|side| side == Self::Both || side == one))
+    }
 }
 
 /// What is to be done to every image and direction of an archive. The default does nothing.
@@ -30,10 +48,16 @@ pub enum Mirrored {
 pub struct Adaptation {
     /// Views of the archive that are left out.
     pub drop_views: Vec<usize>,
+    /// Lights that are left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub drop_lights: Vec<usize>,
     /// What the archive calls light is the view, and the other way round.
     pub swap: bool,
+    /// What the archive calls theta is the elevation above the surface.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub elevations: Option<Side>,
     /// Azimuths run clockwise.
-    pub mirrored: Option<Mirrored>,
+    pub mirrored: Option<Side>,
     /// Counter-clockwise turn of all directions, degrees: a multiple of 90.
     pub turn_deg: u16,
     /// Rows and columns of the images are exchanged.
@@ -75,19 +99,96 @@ impl Adaptation {
     /// What it does to an archive: whatever asks for what the archive is already is left out, and what the archive
     /// asks for itself is put in. So different words for the same bytes are the same.
     fn effective(mut self, of: &Contents) -> Self {
-        self.drop_views.sort_unstable();
-        self.drop_views.dedup();
+        for numbers in [&mut self.drop_views, &mut self.drop_lights] {
+            numbers.sort_unstable();
+            numbers.dedup();
+        }
         self.cosine_excluded |= !of.cosine_included;
         self.transfer = self.transfer.filter(|&transfer| (transfer == Transfer::Linear) != of.linear);
         self.samples = self.samples.filter(|&name| SampleType::from(name) != of.sample_type);
         self
+    }
+
+    /// Lights and views as the archive has them, by their numbers, that are left out: light and view may be exchanged.
+    pub(super) fn dropped(&self) -> [&[usize]; 2] {
+        let [mut lights, mut views] = [&self.drop_lights, &self.drop_views].map(Vec::as_slice);
+        if self.swap {
+            std::mem::swap(&mut lights, &mut views);
+        }
+        [lights, views]
+    }
+
+    /// Numbers of the lights and of the views that are kept.
+    fn kept(&self, of: &Contents, path: &Path) -> Result<[Vec<usize>; 2]> {
+        let mut counts = [of.lights.len(), of.views.len()];
+        if self.swap {
+            counts.reverse();
+        }
+        let [lights, views] = counts;
+        let kept = |what: &str, count: usize, dropped: &[usize]| {
+            let path = path.display();
+            if let Some(&beyond) = dropped.iter().find(|&&number| number >= count) {
+                return Err(Error::usage(format!("{path}: no {what} {beyond} to drop, there are {count}")));
+            }
+            let kept: Vec<usize> = (0..count).filter(|number| !dropped.contains(number)).collect();
+            if kept.is_empty() {
+                return Err(Error::usage(format!("{path}: no {what} is left")));
+            }
+            Ok(kept)
+        };
+        Ok([kept("light", lights, &self.drop_lights)?, kept("view", views, &self.drop_views)?])
+    }
+
+    /// All lights and views, mended.
+    fn directions(&self, of: &Contents, views_are_assumed: bool) -> [Vec<Direction>; 2] {
+        let turn = f64::from(self.turn_deg).to_radians();
+        let mended = |list: &[Direction], elevations: bool, mirrored: bool| {
+            let mend = |direction: &Direction| {
+                let Direction { theta_rad, phi_rad } =
+                    if elevations { of_elevation(*direction) } else { *direction };
+                let phi_rad = if mirrored { -phi_rad } else { phi_rad };
+                let turned = (phi_rad + turn).rem_euclid(std::f64::consts::TAU);
+                Direction { theta_rad, phi_rad: turned }
+            };
+            list.iter().map(mend).collect::<Vec<_>>()
+        };
+        let mut lists = [&of.lights, &of.views];
+        // A view that no name gives is frontal, and no elevation.
+        let mut given = [true, !views_are_assumed];
+        if self.swap {
+            lists.reverse();
+            given.reverse();
+        }
+        let [elevations, mirrored] = [self.elevations, self.mirrored].map(Side::lights_and_views);
+        std::array::from_fn(|side| mended(lists[side], elevations[side] && given[side], mirrored[side]))
+    }
+}
+
+/// The direction whose elevation above the surface stands where its angle from the normal should.
+pub(crate) fn of_elevation(direction: Direction) -> Direction {
+    let (elevation_deg, phi_deg) = direction.degrees();
+    // Without the noise of the conversion, so that it is what a name with theta would give.
+    let theta_deg = ((90.0 - elevation_deg) * 1e9).round().max(0.0) / 1e9;
+    Direction::from_degrees(theta_deg, if theta_deg > 0.0 { phi_deg } else { 0.0 })
+}
+
+/// That no two directions are straight above: their azimuths told them apart while they were on the horizon.
+fn expect_distinct(list: &[Direction], what: &str, path: &Path) -> Result<()> {
+    let mut above = (0..list.len()).filter(|&number| list[number].theta_rad == 0.0);
+    match (above.next(), above.next()) {
+        (Some(first), Some(second)) => Err(Error::input(format!(
+            "{}: the {what} {first} and {second} are both straight above as elevations of 90 degrees, expected one",
+            path.display()
+        ))
+        .hint("if these angles are no elevations, leave out --polar; else leave all but one of them out by --drop-view or --drop-light")),
+        _ => Ok(()),
     }
 }
 
 /// The source as it should have been.
 ///
 /// # Errors
-/// A view to drop that there is none of, or no view left.
+/// A view or light to drop that there is none of, none left, or elevations that are one direction.
 pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn Source>> {
     let of = inner.contents();
     let adaptation = reading.adaptation.effective(of);
@@ -103,30 +204,18 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
         About::Azimuths => adaptation.mirrored.is_none() && adaptation.turn_deg == 0,
         About::Cosine => !(adaptation.cosine_excluded && of.cosine_included),
         About::Transfer => adaptation.transfer.is_none(),
-        About::Other => true,
+        About::Views | About::Other => true,
     });
-    let [mut views, mut lights] = [of.views.clone(), of.lights.clone()];
-    if adaptation.swap {
-        std::mem::swap(&mut views, &mut lights);
+    let views_are_assumed = of.assumptions.iter().any(|assumption| assumption.about == About::Views);
+    let [kept_lights, kept_views] = adaptation.kept(of, inner.path())?;
+    let [mut lights, mut views] = adaptation.directions(of, views_are_assumed);
+    if adaptation.elevations.is_some() {
+        expect_distinct(&lights, "lights", inner.path())?;
+        expect_distinct(&views, "views", inner.path())?;
     }
-    if let Some(&beyond) = adaptation.drop_views.iter().find(|&&view| view >= views.len()) {
-        let found =
-            format!("{}: no view {beyond} to drop, there are {}", inner.path().display(), views.len());
-        return Err(Error::usage(found));
-    }
-    let kept: Vec<usize> = (0..views.len()).filter(|view| !adaptation.drop_views.contains(view)).collect();
-    if kept.is_empty() {
-        return Err(Error::usage(format!("{}: no view is left", inner.path().display())));
-    }
-    let turn = f64::from(adaptation.turn_deg).to_radians();
-    let turned = |direction: &Direction, mirrored: bool| {
-        let phi = if mirrored { -direction.phi_rad } else { direction.phi_rad };
-        Direction { phi_rad: (phi + turn).rem_euclid(std::f64::consts::TAU), ..*direction }
-    };
-    let mirrored =
-        |one| matches!(adaptation.mirrored, Some(found) if found == Mirrored::Both || found == one);
-    contents.views = kept.iter().map(|&view| turned(&views[view], mirrored(Mirrored::Views))).collect();
-    contents.lights = lights.iter().map(|light| turned(light, mirrored(Mirrored::Lights))).collect();
+    lights = kept_lights.iter().map(|&light| lights[light]).collect();
+    views = kept_views.iter().map(|&view| views[view]).collect();
+    (contents.lights, contents.views) = (lights, views);
     if adaptation.transpose {
         (contents.width, contents.height) = (contents.height, contents.width);
     }
@@ -139,7 +228,8 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
     Ok(Box::new(Adapted {
         inner,
         contents,
-        kept,
+        kept_views,
+        kept_lights,
         swap: adaptation.swap,
         transpose: adaptation.transpose,
         cosines,
@@ -151,7 +241,9 @@ struct Adapted {
     inner: Box<dyn Source>,
     contents: Contents,
     /// The inner source's number of each view (of each light, where they are exchanged).
-    kept: Vec<usize>,
+    kept_views: Vec<usize>,
+    /// The same of each light.
+    kept_lights: Vec<usize>,
     swap: bool,
     transpose: bool,
     /// What each light's samples are multiplied by, in linear light.
@@ -218,16 +310,26 @@ impl Source for Adapted {
 impl Adapted {
     /// Images in their own type, of the right directions and the right way round.
     fn mended(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
-        let view = *self.kept.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
-        let mut samples = if self.swap {
-            let mut samples = Samples::none(self.inner.contents().sample_type);
-            for light in lights.clone() {
-                samples.append(&self.inner.read_images(light, view..view + 1)?);
+        let view = *self.kept_views.get(view).ok_or_else(|| Error::internal(format!("no view {view}")))?;
+        let lights = self.kept_lights.get(lights).ok_or_else(|| Error::internal("no such lights"))?;
+        let read = |run: &[usize]| match run {
+            [first, .., last] if !self.swap => self.inner.read_images(view, *first..last + 1),
+            [light] if !self.swap => self.inner.read_images(view, *light..light + 1),
+            lights => {
+                let mut samples = Samples::none(self.inner.contents().sample_type);
+                for &light in lights {
+                    samples.append(&self.inner.read_images(light, view..view + 1)?);
+                }
+                Ok(samples)
             }
-            samples
-        } else {
-            self.inner.read_images(view, lights.clone())?
         };
+        // Lights that follow each other in the archive are read at once.
+        let mut runs = lights.chunk_by(|a, b| a + 1 == *b);
+        let mut samples =
+            runs.next().map_or_else(|| Ok(Samples::none(self.inner.contents().sample_type)), read)?;
+        for run in runs {
+            samples.append(&read(run)?);
+        }
         let Contents { width, height, channels, .. } = &self.contents;
         if self.transpose {
             samples = transposed(&samples, *height as usize, *width as usize, channels.len());
@@ -352,7 +454,7 @@ mod tests {
         let adaptation = Adaptation {
             swap: true,
             drop_views: vec![1],
-            mirrored: Some(Mirrored::Lights),
+            mirrored: Some(Side::Lights),
             turn_deg: 90,
             ..Adaptation::default()
         };

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use btfkit_formats::named::{self, Pattern, natural_order};
-use btfkit_formats::{Angles, Catalogue, CatalogueErrors, Limits, Pair, rti, table, ubo2003};
+use btfkit_formats::{
+    Angles, Assumption, Catalogue, CatalogueErrors, Doubt, Limits, Pair, Without, rti, table, ubo2003,
+};
 
 use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
@@ -15,7 +17,7 @@ use crate::words::counted;
 pub(super) struct Found {
     pub(super) catalogue: Catalogue,
     pub(super) format: String,
-    pub(super) assumptions: Vec<String>,
+    pub(super) assumptions: Vec<Assumption>,
 }
 
 /// What to do where names tell nothing.
@@ -23,7 +25,9 @@ const NAMES: &str = "expected names like `00081 tl015 pl000 tv000 pv000.jpg`; --
      '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png' says where the angles stand, --table FILE.csv lists them, \
      docs/formats/folders.md lists the fields";
 
-const FRONTAL: &str = "there are no view directions: one frontal view";
+fn frontal() -> Assumption {
+    Assumption::views("there are no view directions: one frontal view")
+}
 
 /// Sorts out the files of an archive.
 ///
@@ -34,8 +38,9 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         // A picture that gives no direction may be one that is missing.
         let left = left_out(files, pairs.iter().map(Option::is_none));
         let shown: Vec<String> = (0..files.len()).map(|number| files.shown(number)).collect();
-        Catalogue::from_pairs(shown.iter().map(String::as_str).zip(pairs))
-            .map_err(|errors| incomplete(archive, &errors, left))
+        let [lights, views] = options.adaptation.dropped().map(<[usize]>::to_vec);
+        Catalogue::from_pairs_without(shown.iter().map(String::as_str).zip(pairs), &Without { views, lights })
+            .map_err(|errors| incomplete(archive, &errors, left, options.adaptation.swap))
     };
     if let Some(path) = &options.table {
         let table = table::read(&read_beside(path)?, limits)
@@ -47,8 +52,8 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
             .collect();
         let (pairs, remark) = match_files(path, files, rows)?;
         let catalogue = complete(pairs)?;
-        let mut assumptions = if table.has_view { Vec::new() } else { vec![FRONTAL.to_owned()] };
-        assumptions.extend(remark);
+        let mut assumptions = if table.has_view { Vec::new() } else { vec![frontal()] };
+        assumptions.extend(remark.map(Assumption::from));
         return Ok(Found { catalogue, format: "pictures with a table".to_owned(), assumptions });
     }
     if let Some(text) = &options.pattern {
@@ -57,7 +62,7 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
                 .hint("docs/formats/folders.md says how patterns are written")
         })?;
         require_fit(&pattern, files).map_err(|error| error.context(archive.display()))?;
-        return by_pattern(&pattern, files, complete);
+        return by_pattern(archive, &pattern, files, complete);
     }
     let lists: Vec<usize> = match files.named_list() {
         Some(named) => vec![named],
@@ -67,15 +72,17 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         return by_light_lists(files, &lists, limits, complete);
     }
     for name in files.names() {
-        let unread = |error| Error::from(error).context(archive.display()).hint(for_unread_angles(name));
+        let unread =
+            |error| Error::from(error).context(archive.display()).hint(for_unread_angles(name, files));
         ubo2003::expect_known(name).map_err(unread)?;
     }
     let pairs: Vec<Option<Pair>> = files.names().map(of_ubo2003_name).collect();
     if pairs.iter().any(Option::is_some) {
+        let turns = expect_possible(archive, files, ubo2003::doubt)?;
         return Ok(Found {
             catalogue: complete(pairs)?,
             format: "pictures named as in UBO2003".to_owned(),
-            assumptions: Vec::new(),
+            assumptions: turns.into_iter().collect(),
         });
     }
     let pattern = named::recognise(files.names()).map_err(|error| {
@@ -83,34 +90,44 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
             return Error::input(foreign).context(archive.display());
         }
         let unread = files.names().find(|name| named::unread_behind(name).is_some());
-        Error::from(error).context(archive.display()).hint(unread.map_or(NAMES.to_owned(), for_unread_angles))
+        Error::from(error)
+            .context(archive.display())
+            .hint(unread.map_or(NAMES.to_owned(), |name| for_unread_angles(name, files)))
     })?;
-    by_pattern(&pattern, files, complete)
+    by_pattern(archive, &pattern, files, complete)
 }
 
-/// What to do about a name with something behind an angle that is not known; digits may be a fraction or a counter.
-fn for_unread_angles(name: &str) -> String {
-    let pattern = match without_counter(name) {
-        Some(pattern) => format!("if the last digits only count: --pattern '{pattern}'"),
-        None => "say by --pattern 'tl{theta_i}_pl{phi_i}_tv{theta_v}_pv{phi_v}_{n}' where the angles stand"
-            .to_owned(),
+/// What to do about a name with something behind an angle that is not known; digits may be a fraction or a counter. A
+/// pattern is advised only if it reads all pictures.
+fn for_unread_angles(name: &str, files: &Files) -> String {
+    let reads_all = |pattern: &Pattern| {
+        let pairs = files.names().map(|name| (name, pattern.angles(name)));
+        let unread = files.names().any(|name| is_picture(name) && pattern.angles(name).is_none());
+        !unread && Catalogue::from_pairs(pairs).is_ok()
     };
-    format!("rename the pictures; or {pattern}; or list the angles by --table FILE.csv")
+    match without_counter(name).filter(reads_all) {
+        Some(pattern) => {
+            format!(
+                "rename the pictures; or if the last digits only count: --pattern '{pattern}'; or list the angles by --table FILE.csv"
+            )
+        }
+        None => "rename the pictures, or list their angles by --table FILE.csv".to_owned(),
+    }
 }
 
 /// The pattern of a name that ends in a counter, if there is one when that is left out.
-fn without_counter(name: &str) -> Option<String> {
+fn without_counter(name: &str) -> Option<Pattern> {
     let (stem, ending) = name.rsplit_once('.')?;
     let before = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     let head = before.strip_suffix(['_', '-', ' ']).filter(|_| before.len() < stem.len())?;
     let pattern = named::recognise([format!("{head}.{ending}").as_str()]).ok()?;
-    Some(format!("{pattern}{}{{n}}", &before[head.len()..]))
+    Pattern::parse(&format!("{pattern}{}{{n}}", &before[head.len()..])).ok()
 }
 
 /// That a pattern which the user gives fits any picture.
 fn require_fit(pattern: &Pattern, files: &Files) -> Result<()> {
     let Some(first) = files.names().find(|name| is_picture(name)) else { return Ok(()) };
-    if files.names().any(|name| pattern.angles(name).is_some()) {
+    if files.names().any(|name| pattern.angles(name).is_some() || pattern.doubt(name).is_some()) {
         return Ok(());
     }
     let found = format!("no name fits the pattern {:?}; the first picture is {first:?}", pattern.to_string());
@@ -120,16 +137,57 @@ fn require_fit(pattern: &Pattern, files: &Files) -> Result<()> {
     ))
 }
 
+/// Refuses names whose angles no direction has; tells of those that are beyond a whole turn.
+///
+/// # Errors
+/// Names the pictures.
+fn expect_possible(
+    archive: &Path,
+    files: &Files,
+    doubt: impl Fn(&str) -> Option<Doubt>,
+) -> Result<Option<Assumption>> {
+    let (mut impossible, mut turns) = (Vec::new(), Vec::new());
+    for name in files.names() {
+        match doubt(name) {
+            Some(Doubt::Impossible(what)) => impossible.push(format!("{name:?} ({what})")),
+            Some(Doubt::WholeTurns(what)) => turns.push(format!("{name:?} ({what})")),
+            None => {}
+        }
+    }
+    let some = |list: &[String]| {
+        let more = list.len().saturating_sub(NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("{}{more}", list.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", "))
+    };
+    if !impossible.is_empty() {
+        let found = format!(
+            "{}: {} with angles that no direction has, expected theta 0 to 90 degrees: {}",
+            archive.display(),
+            counted(impossible.len(), "picture"),
+            some(&impossible)
+        );
+        return Err(Error::input(found).hint(
+            "correct the names; or move these pictures away; or list those that count by --table FILE.csv",
+        ));
+    }
+    Ok((!turns.is_empty()).then(|| {
+        format!("azimuths beyond 360 degrees are read without their whole turns: {}", some(&turns)).into()
+    }))
+}
+
 fn by_pattern(
+    archive: &Path,
     pattern: &Pattern,
     files: &Files,
     complete: impl Fn(Vec<Option<Pair>>) -> Result<Catalogue>,
 ) -> Result<Found> {
+    let turns = expect_possible(archive, files, |name| pattern.doubt(name))?;
     let catalogue = complete(files.names().map(|name| pattern.angles(name)).collect())?;
-    let mut assumptions = vec![format!("names follow the pattern {pattern}")];
+    let mut assumptions = vec![Assumption::from(format!("names follow the pattern {pattern}"))];
     if !pattern.has_view() {
-        assumptions.push(FRONTAL.to_owned());
+        assumptions.push(frontal());
     }
+    assumptions.extend(turns);
     Ok(Found { catalogue, format: "pictures named by a pattern".to_owned(), assumptions })
 }
 
@@ -140,7 +198,7 @@ fn of_ubo2003_name(name: &str) -> Option<Pair> {
 /// What a light list says: the pair of each file, and what had to be assumed.
 struct Lights {
     pairs: Vec<Option<Pair>>,
-    assumptions: Vec<String>,
+    assumptions: Vec<Assumption>,
 }
 
 /// The set that the light lists of an archive describe. Several may be there if they say the same.
@@ -173,7 +231,7 @@ fn by_light_lists(
     }
     let Some((_, lights)) = read else { return Err(Error::internal("no light list")) };
     let Lights { pairs, mut assumptions } = lights?;
-    assumptions.insert(0, FRONTAL.to_owned());
+    assumptions.insert(0, frontal());
     Ok(Found { catalogue: complete(pairs)?, format: "RTI light list (.lp)".to_owned(), assumptions })
 }
 
@@ -195,7 +253,10 @@ fn read_light_list(files: &Files, list: usize, limits: &Limits) -> Result<Lights
         Some(rows) => match_files(Path::new(name), files, rows)?,
         None => in_order(name, files, lights.lamps.iter().map(|lamp| frontal(lamp.light)).collect())?,
     };
-    Ok(Lights { pairs, assumptions: lights.warnings.into_iter().chain(remark).collect() })
+    Ok(Lights {
+        pairs,
+        assumptions: lights.warnings.into_iter().chain(remark).map(Assumption::from).collect(),
+    })
 }
 
 /// The pair of each file that a list names, and a remark on names that differ; the list lies at `list`.
@@ -258,6 +319,46 @@ fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<
         );
         return Err(Error::input(found).hint("put the names of the pictures into the list"));
     }
+    // Names that differ in more than a number have an order that is hardly meant: left.png, right.png.
+    let without_numbers = |number: usize| {
+        let name = small(number);
+        let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem).to_owned();
+        stem.split(|c: char| c.is_ascii_digit())
+            .filter(|part| !part.is_empty())
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    let has_number = |number: usize| {
+        let name = name(number);
+        name.rsplit_once('.').map_or(name, |(stem, _)| stem).contains(|c: char| c.is_numeric())
+    };
+    if let Some(&plain) = pictures.iter().find(|&&number| !has_number(number))
+        && pictures.len() > 1
+    {
+        let found = format!("{list}: lights without names, and {}, which has no number", name(plain));
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
+    if let Some((&a, &b)) = neighbours().find(|&(&a, &b)| without_numbers(a) != without_numbers(b)) {
+        let found = format!(
+            "{list}: lights without names, and {} and {}, which differ in more than their numbers",
+            name(a),
+            name(b)
+        );
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
+    // The order of 0.5 and 0.10 is another one for fractions than for two numbers.
+    let fraction = |number: usize| {
+        let name = name(number);
+        let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem).as_bytes();
+        stem.windows(3).any(|three| {
+            three[0].is_ascii_digit() && matches!(three[1], b'.' | b',') && three[2].is_ascii_digit()
+        })
+    };
+    if let Some(&number) = pictures.iter().find(|&&number| fraction(number)) {
+        let found =
+            format!("{list}: lights without names, and {}, whose number may have a fraction", name(number));
+        return Err(Error::input(found).hint("put the names of the pictures into the list"));
+    }
     let other_digits = |name: &str| name.contains(|c: char| c.is_numeric() && !c.is_ascii_digit());
     if let Some(&number) = pictures.iter().find(|&&number| other_digits(name(number))) {
         let found = format!(
@@ -296,9 +397,26 @@ pub(super) fn left_out(files: &Files, left: impl Iterator<Item = bool>) -> Optio
     (!names.is_empty()).then(|| format!("pictures without directions are left out: {shown}{more}"))
 }
 
-fn incomplete(archive: &Path, errors: &CatalogueErrors, left_out: Option<String>) -> Error {
+/// What is missing or too often there, and how to go on without it; `swap` if what is called light is the view.
+fn incomplete(archive: &Path, errors: &CatalogueErrors, left_out: Option<String>, swap: bool) -> Error {
+    if errors.images == 0 && errors.views.min(errors.lights) == 0 && errors.ignored == 0 {
+        return Error::usage(format!("{}: no view or no light is left", archive.display()));
+    }
     let lines: Vec<String> = errors.to_string().lines().map(str::to_owned).chain(left_out).collect();
-    Error::list(ErrorKind::Input, lines)
-        .context(archive.display())
-        .hint("expected one picture for each pair of directions")
+    let mut options = ["--drop-view", "--drop-light"];
+    if swap {
+        options.reverse();
+    }
+    let spared: Vec<String> = [&errors.spare_views, &errors.spare_lights]
+        .into_iter()
+        .zip(options)
+        .flat_map(|(spare, option)| {
+            spare.iter().map(move |(number, angles)| format!("{option} {number} ({})", angles.direction()))
+        })
+        .collect();
+    let hint = match spared.as_slice() {
+        [] => "expected one picture for each pair of directions".to_owned(),
+        list => format!("put them there; or go on without: {}", list.join(" ")),
+    };
+    Error::list(ErrorKind::Input, lines).context(archive.display()).hint(hint)
 }

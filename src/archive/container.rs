@@ -23,8 +23,12 @@ const GROUPS: usize = 8;
 /// The beginning of every `.npy` file.
 const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
-/// What to do where directions are missing.
-const ORDER: &str = "--order names a published list of directions (ubo81, bonn151, uniform)";
+/// What to do where a file does not name its directions: UTIA's have an order of images.
+const ORDER_OF_IMAGES: &str = "--order says in which order its images are: ubo81 or uniform";
+
+/// The same of arrays, which have lists beside them.
+const LISTS: &str = "write NAME.lights.npy and NAME.views.npy beside it; or, if its directions are the 81 or the 151 that are \
+     published, in their order: --order ubo81 or --order bonn151";
 
 /// A container, and the type that its samples are best kept as where that is not their own.
 pub(super) struct Recognised {
@@ -34,78 +38,121 @@ pub(super) struct Recognised {
     pub(super) uses: &'static [&'static str],
 }
 
+impl Recognised {
+    fn of(source: impl Source + 'static, uses: &'static [&'static str]) -> Self {
+        Self { source: Box::new(source), samples: None, uses }
+    }
+}
+
+/// A kind of container.
+struct Kind {
+    /// With its article.
+    name: &'static str,
+    is: fn(&[u8]) -> bool,
+    open: fn(&Path, &Options, &Limits) -> Result<Recognised>,
+}
+
+/// Every container that is read; the first whose beginning fits counts.
+const KINDS: [Kind; 6] = [
+    Kind { name: "a Bonn BTF archive", is: |head| bonn::recognise(head).is_some(), open: open_bonn },
+    Kind { name: "an MLVQ database", is: mlvq::recognise, open: open_mlvq },
+    Kind { name: "a UTIA BIG archive", is: big::recognise, open: open_big },
+    Kind { name: "a MIF archive", is: mif::recognise, open: open_mif },
+    Kind { name: "a numpy array", is: |head| head.starts_with(NPY_MAGIC), open: open_npy },
+    Kind { name: "an HDF5 file", is: crate::archive::hdf5::recognise, open: open_hdf5 },
+];
+
+fn kind_of(head: &[u8]) -> Option<&'static Kind> {
+    KINDS.iter().find(|kind| (kind.is)(head))
+}
+
 /// What a container is by its first bytes, with its article; `None` if it is none.
 pub fn name_of(head: &[u8]) -> Option<&'static str> {
-    match head {
-        _ if bonn::recognise(head).is_some() => Some("a Bonn BTF archive"),
-        _ if mlvq::recognise(head) => Some("an MLVQ database"),
-        _ if big::recognise(head) => Some("a UTIA BIG archive"),
-        _ if mif::recognise(head) => Some("a MIF archive"),
-        _ if head.starts_with(NPY_MAGIC) => Some("a numpy array"),
-        _ if crate::archive::hdf5::recognise(head) => Some("an HDF5 file"),
-        _ => None,
-    }
+    kind_of(head).map(|kind| kind.name)
 }
 
 /// Opens a file that is a container by its first bytes; `None` if it is none.
 pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
     let head = files::read_head(path, HEAD_BYTES)?;
-    let mut samples = None;
-    let mut uses: &[&str] = &[];
-    let opened = if bonn::recognise(&head).is_some() {
-        uses = &["--rows"];
-        Container::open(path, ORDER, |bytes| {
-            let mut how = bonn::OpenOptions::default();
-            how.rows = options.rows;
-            Ok(Box::new(bonn::Archive::open(bytes, &how, limits)?))
-        })
-    } else if mlvq::recognise(&head) {
-        samples = Some(Type::U8);
-        let known = zero_bytes_beside(path)?;
-        let place = zero_bytes_place(path);
-        let way_out = format!(
-            "{} says that; take the line out, or move the file away: a rule then tells the bytes apart",
-            place.display()
-        );
-        Container::open(path, &way_out, |bytes| Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?)))
-            .map(|container| Container { beside: vec![place], ..container })
-    } else if big::recognise(&head) {
-        let order = order(options)?;
-        uses = &["--order"];
-        Container::open(path, ORDER, |bytes| {
-            let mut how = big::Options::default();
-            how.order = order;
-            Ok(Box::new(big::Big::open(bytes, &how, limits)?))
-        })
-    } else if mif::recognise(&head) {
-        let order = order(options)?;
-        uses = &["--order"];
-        Container::open(path, ORDER, |bytes| {
-            let mut how = mif::Options::default();
-            how.order = order;
-            Ok(Box::new(mif::Mif::open(bytes, &how, limits)?))
-        })
-    } else if head.starts_with(NPY_MAGIC) {
-        let beside = directions_beside(path, options, limits)?;
-        if !["views", "lights"].into_iter().all(|kind| path.with_extension(format!("{kind}.npy")).is_file()) {
-            uses = &["--order"];
-        }
-        Container::open(path, ORDER, |bytes| Ok(Box::new(npy::Archive::open(bytes, beside, limits)?)))
-    } else if crate::archive::hdf5::recognise(&head) {
-        return Ok(Some(Recognised { source: open_hdf5(path, limits)?, samples, uses }));
-    } else {
-        return Ok(None);
+    kind_of(&head).map(|kind| (kind.open)(path, options, limits)).transpose()
+}
+
+fn open_bonn(path: &Path, options: &Options, limits: &Limits) -> Result<Recognised> {
+    let mut how = bonn::OpenOptions::default();
+    how.rows = options.rows;
+    let container =
+        Container::open(path, |_| None, |bytes| Ok(Box::new(bonn::Archive::open(bytes, &how, limits)?)))?;
+    Ok(Recognised::of(container, &["--rows"]))
+}
+
+fn open_mlvq(path: &Path, _: &Options, limits: &Limits) -> Result<Recognised> {
+    let known = zero_bytes_beside(path)?;
+    let place = zero_bytes_place(path);
+    let way_out = format!(
+        "{} says that; take the line out, or move the file away: a rule then tells the bytes apart",
+        place.display()
+    );
+    let open = |bytes: &[u8]| -> btfkit_formats::Result<Box<dyn Images>> {
+        Ok(Box::new(mlvq::Database::open(bytes, &known, limits)?))
     };
-    Ok(Some(Recognised { source: Box::new(opened?), samples, uses }))
+    let container = Container::open(path, |error| asks(error).then_some(way_out.as_str()), open)?;
+    let source = Container { beside: vec![place], ..container };
+    Ok(Recognised { samples: Some(Type::U8), ..Recognised::of(source, &[]) })
+}
+
+fn open_big(path: &Path, options: &Options, limits: &Limits) -> Result<Recognised> {
+    let mut how = big::Options::default();
+    how.order = order(options)?;
+    let open = |bytes: &[u8]| -> btfkit_formats::Result<Box<dyn Images>> {
+        Ok(Box::new(big::Big::open(bytes, &how, limits)?))
+    };
+    Ok(Recognised::of(Container::open(path, |error| way_out_of(options, error), open)?, &["--order"]))
+}
+
+fn open_mif(path: &Path, options: &Options, limits: &Limits) -> Result<Recognised> {
+    let mut how = mif::Options::default();
+    how.order = order(options)?;
+    let open = |bytes: &[u8]| -> btfkit_formats::Result<Box<dyn Images>> {
+        Ok(Box::new(mif::Mif::open(bytes, &how, limits)?))
+    };
+    Ok(Recognised::of(Container::open(path, |error| way_out_of(options, error), open)?, &["--order"]))
+}
+
+/// Whether an error is about what else must be said of a file.
+fn asks(error: &btfkit_formats::Error) -> bool {
+    error.kind() == ErrorKind::Argument
+}
+
+/// What to do about the directions of a BIG or MIF file, where an error is about the order of its images.
+fn way_out_of(options: &Options, error: &btfkit_formats::Error) -> Option<&'static str> {
+    let about_order =
+        ["order of images", "for the order"].iter().any(|words| error.to_string().contains(words));
+    about_order.then_some(match options.order {
+        Some(_) => "leave out --order, or name another one: ubo81 or uniform",
+        None => ORDER_OF_IMAGES,
+    })
+}
+
+fn open_npy(path: &Path, options: &Options, limits: &Limits) -> Result<Recognised> {
+    let beside = directions_beside(path, options, limits)?;
+    let has_lists =
+        ["views", "lights"].into_iter().all(|kind| path.with_extension(format!("{kind}.npy")).is_file());
+    let open = |bytes: &[u8]| -> btfkit_formats::Result<Box<dyn Images>> {
+        Ok(Box::new(npy::Archive::open(bytes, beside, limits)?))
+    };
+    Ok(Recognised::of(
+        Container::open(path, |error| asks(error).then_some(LISTS), open)?,
+        if has_lists { &[] } else { &["--order"] },
+    ))
 }
 
 #[cfg(feature = "hdf5")]
-fn open_hdf5(path: &Path, limits: &Limits) -> Result<Box<dyn Source>> {
-    Ok(Box::new(super::hdf5::source::Hdf5::open(path, limits)?))
+fn open_hdf5(path: &Path, _: &Options, limits: &Limits) -> Result<Recognised> {
+    Ok(Recognised::of(super::hdf5::source::Hdf5::open(path, limits)?, &[]))
 }
 
 #[cfg(not(feature = "hdf5"))]
-fn open_hdf5(path: &Path, _: &Limits) -> Result<Box<dyn Source>> {
+fn open_hdf5(path: &Path, _: &Options, _: &Limits) -> Result<Recognised> {
     Err(crate::archive::hdf5::not_built_in(path))
 }
 
@@ -196,19 +243,23 @@ fn state_of(path: &Path) -> Result<State> {
 }
 
 impl Container {
-    /// Maps a file and opens it by `open`; `way_out` is what to do where more must be said of the file, or less.
-    fn open(
+    /// Maps a file and opens it by `open`; `way_out` is what to do about an error, if more must be said of the file, or
+    /// less.
+    fn open<'a>(
         path: &Path,
-        way_out: &str,
+        way_out: impl Fn(&btfkit_formats::Error) -> Option<&'a str>,
         open: impl FnOnce(&[u8]) -> btfkit_formats::Result<Box<dyn Images>>,
     ) -> Result<Self> {
         files::regular(path)?;
         let opened = state_of(path)?;
         let file = MappedFile::open(path).map_err(|error| Error::io("read", path, error))?;
         let images = open(file.as_ref()).map_err(|error| {
-            let asked = error.kind() == ErrorKind::Argument;
+            let way_out = way_out(&error);
             let error = Error::from(error).context(path.display());
-            if asked { error.hint(way_out) } else { error }
+            match way_out {
+                Some(way_out) => error.hint(way_out),
+                None => error,
+            }
         })?;
         Ok(Self { path: path.to_owned(), file, images, opened, beside: Vec::new() })
     }

@@ -141,10 +141,13 @@ impl Files {
                 Location::Plain(path) => Cow::Owned(read_head(path, HEAD_BYTES).ok()?),
                 Location::Zipped { .. } => self.bytes(number).ok()?,
             };
-            let found = picture::foreign(self.name(number), &head);
+            let name = self.name(number);
+            let told = match picture::foreign(name, &head) {
+                Some((what, way_out)) => Some(format!("{what}, which is not read: {way_out}")),
+                None => picture::recognise(&head).filter(|_| !is_picture(name)).map(misnamed),
+            };
             self.release(number);
-            let (what, way_out) = found?;
-            Some(format!("{} is {what}, which is not read: {way_out}", self.shown(number)))
+            Some(format!("{} is {}", self.shown(number), told?))
         };
         (0..self.len().min(SNIFFED)).find_map(told)
     }
@@ -346,4 +349,17 @@ pub(super) fn is_picture(name: &str) -> bool {
 /// Whether a name ends in an extension, in whatever case.
 pub(super) fn has_extension(name: &str, extension: &str) -> bool {
     Path::new(name).extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
+}
+
+/// What to do with a picture whose name does not say that it is one.
+fn misnamed(format: picture::Format) -> String {
+    use picture::Format::{Exr, Hdr, Jpeg, Png, Tiff};
+    let (what, ending) = match format {
+        Jpeg => ("a JPEG", "jpg"),
+        Png => ("a PNG", "png"),
+        Tiff => ("a TIFF", "tif"),
+        Hdr => ("a Radiance picture", "hdr"),
+        Exr => ("an OpenEXR picture", "exr"),
+    };
+    format!("{what} by its content, which its name does not say: let it end in .{ending}")
 }

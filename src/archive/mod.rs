@@ -4,6 +4,7 @@
 //! [`Source`]. [`adapt`] wraps a source to mend what is known to be wrong with an archive.
 
 pub mod adapt;
+mod as_options;
 mod catalogue;
 mod container;
 mod files;
@@ -106,6 +107,22 @@ pub struct Options {
 }
 
 impl Options {
+    /// These options, or where they ask for no reading of their own, those by which a store was made: of what a reading
+    /// says only; where the directions stand is asked anew.
+    pub fn or_as_in(self, reading: Reading) -> Self {
+        if Reading::of(&self) != Reading::default() {
+            return self;
+        }
+        let Reading { adaptation, order, bottom_row_first, columns_as_rows } = reading;
+        Self {
+            adaptation,
+            order,
+            rows: if bottom_row_first { RowOrder::BottomFirst } else { RowOrder::TopFirst },
+            hdr_orientation: if columns_as_rows { HdrOrientation::Atrium } else { HdrOrientation::Rules },
+            ..self
+        }
+    }
+
     /// Refuses options that say nothing about an archive.
     fn expect_used(&self, uses: &[&str], source: &dyn Source) -> Result<()> {
         let given = [
@@ -117,7 +134,11 @@ impl Options {
                 "BIG and MIF files, and for arrays without directions of their own",
             ),
             ("--rows", self.rows == RowOrder::BottomFirst, "Bonn's containers"),
-            ("--hdr", self.hdr_orientation == HdrOrientation::Atrium, "pictures"),
+            (
+                "--hdr",
+                self.hdr_orientation == HdrOrientation::Atrium,
+                "Radiance pictures whose headers name X first",
+            ),
         ];
         match given.into_iter().find(|(option, is_given, _)| *is_given && !uses.contains(option)) {
             Some((option, _, whose)) => Err(Error::usage(format!(
@@ -221,17 +242,18 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
         [path] if path.is_file() => container::recognise(path, options, &limits)?,
         _ => None,
     };
-    let uses = single.as_ref().map_or(pictures::USES, |recognised| recognised.uses);
-    let source: Box<dyn Source> = match single {
+    let (source, uses): (Box<dyn Source>, _) = match single {
         Some(recognised) => {
             // Databases of display values come from 8-bit images.
             reading.adaptation.samples = reading.adaptation.samples.or(recognised.samples);
-            recognised.source
+            (recognised.source, recognised.uses)
         }
         None => {
             instead::expect_no_store(paths)?;
             let opened = pictures::Pictures::open(paths, options, limits);
-            Box::new(opened.map_err(|error| instead::of_containers(paths).unwrap_or(error))?)
+            let pictures = opened.map_err(|error| instead::of_containers(paths).unwrap_or(error))?;
+            let uses = pictures.uses();
+            (Box::new(pictures), uses)
         }
     };
     options.expect_used(uses, source.as_ref())?;
@@ -243,8 +265,10 @@ pub fn open(paths: &[PathBuf], options: &Options) -> Result<Box<dyn Source>> {
 /// What a user should know of an archive that its samples do not depend on, a sentence each.
 pub fn notes(source: &dyn Source) -> Vec<String> {
     let contents = source.contents();
-    let doubts =
-        plausibility::near_directions(contents).into_iter().chain(plausibility::doubtful_angles(contents));
+    let elevations = source.reading().adaptation.elevations;
+    let doubts = plausibility::near_directions(contents)
+        .into_iter()
+        .chain(plausibility::doubtful_angles(contents, elevations));
     source.notes().into_iter().chain(plausibility::single_channel(contents)).chain(doubts).collect()
 }
 

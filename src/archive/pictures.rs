@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use btfkit_formats::picture::{self, DecodeOptions, PictureHeader};
-use btfkit_formats::{Angles, Assumption, Contents, Limits, SampleType, Samples};
+use btfkit_formats::{Angles, Assumption, Catalogue, Contents, Limits, SampleType, Samples};
 
 use super::catalogue::{self, Found};
 use super::files::Files;
@@ -18,20 +18,19 @@ use crate::words::counted;
 /// Problems that an error names one by one.
 const NAMED_PROBLEMS: usize = 20;
 
-/// The options that pictures have a use for.
-pub(super) const USES: &[&str] = &["--pattern", "--table", "--hdr"];
-
 /// Pictures whose directions are known.
 pub(super) struct Pictures {
     path: PathBuf,
     files: Files,
-    /// File of each image, [view, light].
-    images: Vec<usize>,
+    /// Which file is the image of a view and a light.
+    catalogue: Catalogue,
     /// What to know of the files that are no images.
     notes: Vec<String>,
     contents: Contents,
     /// What the first picture asks for; no picture is turned.
     orientation: u8,
+    /// Whether the first picture's scan lines are columns, so that there are two ways to read it.
+    scanlines_are_columns: bool,
     /// What the first picture says of its colours; nothing of it is applied.
     profile: Option<String>,
     /// What of the first picture is read and what is not.
@@ -40,7 +39,7 @@ pub(super) struct Pictures {
     bytes_in_use: u64,
     decoding: DecodeOptions,
     limits: Limits,
-    /// CRC-32 of each image when all were checked, in the order of `images`.
+    /// CRC-32 of each image when all were checked, in the order of the catalogue's.
     checked: OnceLock<Vec<u32>>,
 }
 
@@ -48,14 +47,10 @@ impl Pictures {
     pub(super) fn open(paths: &[PathBuf], options: &Options, limits: Limits) -> Result<Self> {
         let path = paths.first().cloned().unwrap_or_default();
         let files = Files::list(paths, &limits)?;
-        let Found { catalogue, format, assumptions } = catalogue::find(&path, &files, options, &limits)?;
-        let mut assumptions: Vec<Assumption> = assumptions.into_iter().map(Assumption::from).collect();
+        let Found { catalogue, format, mut assumptions } = catalogue::find(&path, &files, options, &limits)?;
         let directions = |angles: &[Angles]| angles.iter().map(|a| a.direction()).collect::<Vec<_>>();
         let (views, lights) = (directions(catalogue.views()), directions(catalogue.lights()));
-        let images: Vec<usize> = (0..views.len())
-            .flat_map(|view| (0..lights.len()).map(move |light| (view, light)))
-            .filter_map(|(view, light)| catalogue.image(view, light))
-            .collect();
+        let images = catalogue.images();
         let first = images.first().copied().ok_or_else(|| Error::input("no images"))?;
         let header = picture::header(&files.bytes(first)?, &limits)
             .map_err(|error| Error::from(error.in_entry(files.name(first))).context(path.display()))?;
@@ -93,15 +88,16 @@ impl Pictures {
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
         let bytes_in_use = images.iter().map(|&file| files.bytes_in_use(file)).max().unwrap_or(0);
-        let notes = notes_of(&files, &images, catalogue.ignored() + files.hidden());
-        let PictureHeader { orientation, profile, remarks, .. } = header;
+        let notes = notes_of(&files, images, catalogue.ignored() + files.hidden());
+        let PictureHeader { orientation, scanlines_are_columns, profile, remarks, .. } = header;
         Ok(Self {
             path,
             files,
-            images,
+            catalogue,
             notes,
             contents,
             orientation,
+            scanlines_are_columns,
             profile,
             remarks,
             bytes_in_use,
@@ -111,9 +107,13 @@ impl Pictures {
         })
     }
 
-    /// Number of an image in the order of `images`.
-    fn number(&self, view: usize, light: usize) -> usize {
-        view * self.contents.lights.len() + light
+    /// The options that these pictures have a use for.
+    pub(super) fn uses(&self) -> &'static [&'static str] {
+        if self.scanlines_are_columns {
+            &["--pattern", "--table", "--hdr"]
+        } else {
+            &["--pattern", "--table"]
+        }
     }
 
     /// Checks the structure of one image; returns its checksum.
@@ -130,6 +130,15 @@ impl Pictures {
                 self.files.name(file),
                 found.orientation,
                 self.orientation
+            )));
+        }
+        if found.scanlines_are_columns != self.scanlines_are_columns {
+            let told = |are_columns: bool| if are_columns { "X" } else { "Y" };
+            return Err(Error::input(format!(
+                "{}: names {} first in its header, expected {} like the first image; write all pictures alike",
+                self.files.name(file),
+                told(found.scanlines_are_columns),
+                told(self.scanlines_are_columns)
             )));
         }
         if found.profile != self.profile {
@@ -174,8 +183,15 @@ impl Pictures {
         )))
     }
 
-    fn decode(&self, number: usize) -> Result<Samples> {
-        let file = self.images[number];
+    /// File of an image, and its number among all that are read.
+    fn image(&self, view: usize, light: usize) -> Result<(usize, usize)> {
+        let place = self.catalogue.place(view, light);
+        place
+            .and_then(|place| Some((*self.catalogue.images().get(place)?, place)))
+            .ok_or_else(|| Error::internal(format!("no image of view {view} and light {light}")))
+    }
+
+    fn decode(&self, file: usize, number: usize) -> Result<Samples> {
         let bytes = self.files.bytes(file)?;
         let checked = self.checked.get().and_then(|all| all.get(number));
         if checked.is_some_and(|&checked| checked != self.files.checksum(file, &bytes)) {
@@ -217,8 +233,8 @@ impl Source for Pictures {
         let mut samples = Samples::none(self.contents.sample_type);
         let mut problems = Vec::new();
         for light in lights {
-            let number = self.number(view, light);
-            match self.decode(number) {
+            let (file, number) = self.image(view, light)?;
+            match self.decode(file, number) {
                 // The only image: no copy.
                 Ok(image) if samples.is_empty() => samples = image,
                 Ok(image) => {
@@ -226,7 +242,7 @@ impl Source for Pictures {
                 }
                 Err(error) => problems.push(error.to_string()),
             }
-            self.files.release(self.images[number]);
+            self.files.release(file);
         }
         fail_on(&self.path, &problems)?;
         Ok(samples)
@@ -236,7 +252,7 @@ impl Source for Pictures {
         let largest = self.bytes_in_use;
         context.require(&format!("checking pictures of up to {} MiB", largest.div_ceil(1 << 20)), largest)?;
         let checked: Vec<Result<u32>> = context.install(|| {
-            each_at_once(&self.images, largest, context, |&file| {
+            each_at_once(self.catalogue.images(), largest, context, |&file| {
                 context.check_stop()?;
                 let checksum = self.check_image(file);
                 self.files.release(file);

@@ -3,6 +3,7 @@
 use btfkit_formats::picture::wavelength_nm;
 use btfkit_formats::{Contents, Direction};
 
+use super::adapt::Side;
 use crate::error::{Error, Result};
 
 /// Directions nearer to each other than this are hardly meant to be two, degrees.
@@ -94,8 +95,8 @@ pub(super) fn near_directions(contents: &Contents) -> Vec<String> {
     [told(&contents.views, "views"), told(&contents.lights, "lights")].into_iter().flatten().collect()
 }
 
-/// What to know of angles that may be others than polar angles in degrees.
-pub(super) fn doubtful_angles(contents: &Contents) -> Vec<String> {
+/// What to know of angles that may be others than polar angles in degrees; `elevations` are those that were read as such.
+pub(super) fn doubtful_angles(contents: &Contents, elevations: Option<Side>) -> Vec<String> {
     let polar = |list: &[Direction]| list.iter().map(|d| d.theta_rad.to_degrees()).fold(0.0, f64::max);
     let (views, lights) = (polar(&contents.views), polar(&contents.lights));
     let highest = views.max(lights);
@@ -109,12 +110,18 @@ pub(super) fn doubtful_angles(contents: &Contents) -> Vec<String> {
             "no direction is more than {highest:.3} degrees from the normal: if the angles are radians, {way_out}"
         ));
     }
-    for (what, highest) in [("view", views), ("light", lights)] {
+    let [lights_read, views_read] = Side::lights_and_views(elevations);
+    for (what, highest, is_read) in [("view", views, views_read), ("light", lights, lights_read)] {
         if highest > 89.5 {
-            notes.push(format!(
-                "a {what} is {highest:.1} degrees from the normal, where nothing can be seen: if the angles are elevations \
-                 above the surface, theta is 90 minus them"
-            ));
+            let found = format!(
+                "a {what} is {highest:.1} degrees from the normal, where nothing can be seen: if the angles are"
+            );
+            notes.push(match is_read {
+                true => format!("{found} no elevations, leave out --polar"),
+                false => {
+                    format!("{found} elevations above the surface, --polar elevation-{what}s reads them so")
+                }
+            });
         }
     }
     notes
@@ -190,7 +197,7 @@ mod tests {
 
     #[test]
     fn angles_that_may_be_radians_or_elevations_are_told() {
-        let told = |lights: &[(f64, f64)]| doubtful_angles(&contents(&["Y"], lights));
+        let told = |lights: &[(f64, f64)]| doubtful_angles(&contents(&["Y"], lights), None);
         assert_eq!(told(&[(0.0, 0.0)]), Vec::<String>::new());
         assert_eq!(told(&[(0.0, 0.0), (75.0, 0.0)]), Vec::<String>::new());
         assert!(told(&[(0.0, 0.0), (1.309, 3.0)])[0].contains("radians"));

@@ -9,9 +9,8 @@ use std::collections::HashSet;
 use serde_json::json;
 
 use super::angular::{Alike, Neighbourhood, angle};
-use super::finding::{Check, Finding, ImageSelection, Severity, confidence, listed, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, apart, confidence, listed, names, round};
 use super::statistics::{Statistics, deviation, median};
-use crate::words::counted;
 
 /// Name of the check.
 pub const NAME: &str = "exposure";
@@ -124,9 +123,8 @@ pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Ch
         return Check::not_checked(
             NAME,
             format!(
-                "{} {:.0} degrees apart predict each other too badly, expected {SPACING_DEG} at most",
-                counted(statistics.lights.len(), "light"),
-                near_lights.spacing_rad.to_degrees()
+                "{}: they predict each other too badly, expected at least {LEAST_DIRECTIONS} within {SPACING_DEG}",
+                apart(statistics.lights.len(), "light", near_lights.spacing_rad.to_degrees())
             ),
         );
     }

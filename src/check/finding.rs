@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::statistics::Statistics;
+use crate::words::counted;
 
 /// Below this confidence a finding is a suspicion and no fault: a person should look. Evidence of 1.43
 /// times its threshold has it.
@@ -56,7 +57,8 @@ impl ImageSelection {
     pub(super) fn named(self, statistics: &Statistics) -> String {
         let angles = |direction: btfkit_formats::Direction| {
             let (theta, phi) = direction.degrees();
-            format!("({}, {})", round(theta, 1), round(phi, 1))
+            // What rounds to a whole turn is 0.
+            format!("({}, {})", round(theta, 1), round(phi, 1) % 360.0)
         };
         let view = self.view.map(|view| format!("view {view} {}", angles(statistics.views[view])));
         let light = self.light.map(|light| format!("light {light} {}", angles(statistics.lights[light])));
@@ -147,6 +149,12 @@ pub(super) fn confidence(times: f64) -> f64 {
 pub(super) fn round(value: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
     (value * unit).round() / unit
+}
+
+/// How many directions there are and how far apart; one alone is apart from nothing.
+pub(super) fn apart(count: usize, what: &str, spacing_deg: f64) -> String {
+    let counted = counted(count, what);
+    if count < 2 { counted } else { format!("{counted} {spacing_deg:.0} degrees apart") }
 }
 
 /// The names of places, the first few of them.

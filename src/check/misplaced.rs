@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::{Alike, Neighbourhood, angle};
-use super::finding::{Check, Finding, ImageSelection, Severity, confidence, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, apart, confidence, names, round};
 use super::statistics::{Statistics, median};
 
 /// Name of the check.
@@ -113,15 +113,15 @@ pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Ch
     let (near_lights, near_views) =
         (Neighbourhood::new(&statistics.lights), Neighbourhood::new(&statistics.views));
     for (what, near, count) in
-        [("lights", &near_lights, statistics.lights.len()), ("views", &near_views, statistics.views.len())]
+        [("light", &near_lights, statistics.lights.len()), ("view", &near_views, statistics.views.len())]
     {
         let spacing = near.spacing_rad.to_degrees();
         if count < LEAST_DIRECTIONS || spacing > SPACING_DEG {
             return Check::not_checked(
                 NAME,
                 format!(
-                    "{count} {what} {spacing:.0} degrees apart predict each other too badly, expected at least \
-                     {LEAST_DIRECTIONS} within {SPACING_DEG}"
+                    "{}: they predict each other too badly, expected at least {LEAST_DIRECTIONS} within {SPACING_DEG}",
+                    apart(count, what, spacing)
                 ),
             );
         }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::angular::Neighbourhood;
-use super::finding::{Check, Finding, ImageSelection, Severity, confidence, names, round};
+use super::finding::{Check, Finding, ImageSelection, Severity, apart, confidence, names, round};
 use super::plane::{Plane, displacement};
 use super::statistics::{Statistics, median};
 
@@ -73,7 +73,8 @@ pub fn check(statistics: &Statistics) -> Check {
         return Check::not_checked(
             NAME,
             format!(
-                "{count} views {spacing_deg:.0} degrees apart, expected at least {LEAST_VIEWS} within {SPACING_DEG}"
+                "{}, expected at least {LEAST_VIEWS} within {SPACING_DEG}",
+                apart(count, "view", spacing_deg)
             ),
         );
     }

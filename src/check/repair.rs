@@ -2,7 +2,7 @@
 //! is one set of options, and an option that was given is never advised again.
 
 use super::Report;
-use crate::archive::adapt::{Adaptation, Mirrored, Type};
+use crate::archive::adapt::{Adaptation, Side};
 use crate::color::Transfer;
 
 impl Report {
@@ -10,13 +10,13 @@ impl Report {
     ///
     /// `given` is how the archive was read.
     pub fn beside(&mut self, given: &Adaptation) {
-        let told = options(given);
+        let told = given.options();
         if told.is_empty() {
             return;
         }
         for finding in self.checks.iter_mut().flat_map(|check| &mut check.findings) {
             let Some(repair) = finding.repair.take() else { continue };
-            finding.repair = repaired(given, &repair).map(|new| change(&told, &options(&new)));
+            finding.repair = repaired(given, &repair).map(|new| change(&told, &new.options()));
             if finding.repair.is_none() {
                 let told: Vec<&str> = told.iter().map(String::as_str).collect();
                 let already = format!(" ({} was given already, and does not repair it)", told.join(" "));
@@ -42,13 +42,19 @@ fn change(before: &[String], now: &[String]) -> String {
 /// How an archive is to be read where it was read so, and `repair` mends what came of that; none where no options do.
 fn repaired(given: &Adaptation, repair: &str) -> Option<Adaptation> {
     let mut new = given.clone();
-    let [lights, views] = mirrored(given.mirrored);
+    let [lights, views] = Side::lights_and_views(given.mirrored);
+    let [low_lights, low_views] = Side::lights_and_views(given.elevations);
     let turned = given.turn_deg % 360;
     match repair.split_once(' ').unwrap_or((repair, "")) {
         ("--swap", _) => {
             new.swap = !given.swap;
-            new.mirrored = of_mirrored([views, lights]);
+            new.mirrored = Side::of(views, lights);
+            new.elevations = Side::of(low_views, low_lights);
+            std::mem::swap(&mut new.drop_views, &mut new.drop_lights);
         }
+        ("--polar", "elevation") => new.elevations = Side::of(!low_lights, !low_views),
+        ("--polar", "elevation-lights") => new.elevations = Side::of(!low_lights, low_views),
+        ("--polar", "elevation-views") => new.elevations = Side::of(low_lights, !low_views),
         ("--transpose", _) => new.transpose = !given.transpose,
         ("--cosine", _) if !given.cosine_excluded => new.cosine_excluded = true,
         ("--transfer", "linear") => new.transfer = Some(Transfer::Linear),
@@ -56,14 +62,14 @@ fn repaired(given: &Adaptation, repair: &str) -> Option<Adaptation> {
         ("--turn", angle) => new.turn_deg = (turned + angle.parse::<u16>().ok()?) % 360,
         // A mirroring behind a turn is one before the turn the other way round.
         ("--azimuth", "mirrored") => {
-            new.mirrored = of_mirrored([!lights, !views]);
+            new.mirrored = Side::of(!lights, !views);
             new.turn_deg = (360 - turned) % 360;
         }
         ("--azimuth", "mirrored-lights") if turned.is_multiple_of(180) => {
-            new.mirrored = of_mirrored([!lights, views]);
+            new.mirrored = Side::of(!lights, views);
         }
         ("--azimuth", "mirrored-views") if turned.is_multiple_of(180) => {
-            new.mirrored = of_mirrored([lights, !views]);
+            new.mirrored = Side::of(lights, !views);
         }
         ("--drop-view", number) => {
             // By its number in the archive, whose views before it may have been left out.
@@ -76,74 +82,26 @@ fn repaired(given: &Adaptation, repair: &str) -> Option<Adaptation> {
     Some(new)
 }
 
-/// Whether the azimuths of lights and of views are mirrored.
-fn mirrored(which: Option<Mirrored>) -> [bool; 2] {
-    [Mirrored::Lights, Mirrored::Views].map(|one| which == Some(Mirrored::Both) || which == Some(one))
-}
-
-fn of_mirrored(lights_and_views: [bool; 2]) -> Option<Mirrored> {
-    match lights_and_views {
-        [true, true] => Some(Mirrored::Both),
-        [true, false] => Some(Mirrored::Lights),
-        [false, true] => Some(Mirrored::Views),
-        [false, false] => None,
-    }
-}
-
-/// The options of `btf import` that ask for a reading.
-fn options(of: &Adaptation) -> Vec<String> {
-    let mut all = Vec::new();
-    let mut add = |wanted: bool, option: String| {
-        if wanted {
-            all.push(option);
-        }
-    };
-    add(of.swap, "--swap".to_owned());
-    if let Some(which) = of.mirrored {
-        let name = match which {
-            Mirrored::Both => "mirrored",
-            Mirrored::Lights => "mirrored-lights",
-            Mirrored::Views => "mirrored-views",
-        };
-        add(true, format!("--azimuth {name}"));
-    }
-    add(of.turn_deg != 0, format!("--turn {}", of.turn_deg));
-    add(of.transpose, "--transpose".to_owned());
-    add(of.cosine_excluded, "--cosine excluded".to_owned());
-    if let Some(transfer) = of.transfer {
-        add(true, format!("--transfer {}", if transfer == Transfer::Linear { "linear" } else { "srgb" }));
-    }
-    if let Some(samples) = of.samples {
-        let name = match samples {
-            Type::U8 => "u8",
-            Type::U16 => "u16",
-            Type::F16 => "f16",
-            Type::F32 => "f32",
-        };
-        add(true, format!("--samples {name}"));
-    }
-    of.drop_views.iter().for_each(|view| add(true, format!("--drop-view {view}")));
-    all
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::archive::adapt::Type;
 
     /// What is advised where an archive was read so and this was found.
     fn advised(given: &Adaptation, repair: &str) -> Option<String> {
-        repaired(given, repair).map(|new| change(&options(given), &options(&new)))
+        repaired(given, repair).map(|new| change(&given.options(), &new.options()))
     }
 
     #[test]
     fn what_was_given_is_taken_into_account_and_never_advised_again() {
         let given = Adaptation::default;
         let turned = Adaptation { turn_deg: 90, ..given() };
-        let both = Adaptation { mirrored: Some(Mirrored::Both), turn_deg: 90, ..given() };
-        let lights = Adaptation { mirrored: Some(Mirrored::Lights), ..given() };
+        let both = Adaptation { mirrored: Some(Side::Both), turn_deg: 90, ..given() };
+        let lights = Adaptation { mirrored: Some(Side::Lights), ..given() };
         let swapped = Adaptation { swap: true, ..lights.clone() };
         let without_cosine = Adaptation { cosine_excluded: true, ..given() };
+        let low = Adaptation { elevations: Some(Side::Both), ..given() };
         let dropped = Adaptation { drop_views: vec![0, 2], ..given() };
         for (given, repair, expected) in [
             (&turned, "--turn 90", Some("--turn 180")),
@@ -164,13 +122,16 @@ mod tests {
                 "--transfer srgb",
                 Some("--transfer srgb --samples f16"),
             ),
+            (&low, "--polar elevation", Some("without --polar")),
+            (&low, "--polar elevation-lights", Some("--polar elevation-views")),
+            (&lights, "--polar elevation", Some("--polar elevation --azimuth mirrored-lights")),
             // The first that is left is number 1 of the archive, the second number 3.
             (&dropped, "--drop-view 0", Some("--drop-view 0 --drop-view 1 --drop-view 2")),
             (&dropped, "--drop-view 1", Some("--drop-view 0 --drop-view 2 --drop-view 3")),
         ] {
             let told = advised(given, repair);
-            assert_eq!(told.as_deref(), expected, "{repair} beside {:?}", options(given));
-            let again = told.is_some_and(|told| told == options(given).join(" "));
+            assert_eq!(told.as_deref(), expected, "{repair} beside {:?}", given.options());
+            let again = told.is_some_and(|told| told == given.options().join(" "));
             assert!(!again, "{repair}");
         }
         assert_eq!(advised(&given(), "--swap").as_deref(), Some("--swap"));

@@ -38,7 +38,7 @@ impl Appearance {
             return console.plan(&plan.summary());
         }
         let found = plan.is_done();
-        print_appearance(&plan.run(context)?, console.found(found));
+        print_appearance(&plan.run(context)?, &self.model, console.found(found));
         Ok(())
     }
 }
@@ -47,7 +47,7 @@ pub(super) fn appearance_plan(model: &Path, lattice: &LatticeChoice) -> Result<a
     appearance::plan(&appearance::Options { model: model.into(), lattice: *lattice })
 }
 
-pub(super) fn print_appearance(report: &AppearanceReport, console: Console) {
+pub(super) fn print_appearance(report: &AppearanceReport, model: &Path, console: Console) {
     let [_, _, height, width] = report.exemplar;
     let coarsest = report.levels.last().map_or(1, |level| level.spacing);
     let levels = counted(report.levels.len(), "level");
@@ -69,7 +69,9 @@ pub(super) fn print_appearance(report: &AppearanceReport, console: Console) {
     let fewest = counts.fewest_in_a_direction();
     if !report.lattice.is_empty() && fewest < FEW_CELLS {
         console.line(format!(
-            "          only {fewest} in a direction: large pieces of an enlargement will be copies; measure a larger part if you can, or let it bend by --lattice none"
+            "          only {fewest} in a direction: large pieces of an enlargement will be copies; measure a larger part if you \
+             can, or let it bend: btf appearance {} --lattice none --force",
+            model.display()
         ));
     }
 }

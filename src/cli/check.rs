@@ -61,7 +61,9 @@ impl Check {
         if self.json {
             console.plan(&with_notes(&report, &notes)?)?;
         } else {
-            print_report(&report, console);
+            // What is a store already is made anew.
+            let again = if is_store(first(&self.paths)) { "--force " } else { "" };
+            print_report(&report, again, console);
             console.notes(&notes);
         }
         if let Some(path) = &self.picture {
@@ -144,7 +146,7 @@ fn open(path: &Path) -> Result<Measurement> {
     Ok(measurement)
 }
 
-fn print_report(report: &Report, console: Console) {
+fn print_report(report: &Report, again: &str, console: Console) {
     let mut rows = vec![row!["check", "result", "of alarm", ""]];
     for check in &report.checks {
         let state = match check.state {
@@ -166,7 +168,7 @@ fn print_report(report: &Report, console: Console) {
         console.line(format!("  {}", finding.message));
         console.line(format!("  evidence: {}", evidence(finding)));
         if let Some(repair) = &finding.repair {
-            console.line(format!("  repair:   btf import ... {repair}"));
+            console.line(format!("  repair:   btf import ... {again}{repair}"));
         }
     }
 }

@@ -7,10 +7,11 @@ use btfkit::method::cluster::lloyd::Limits;
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::stage::cluster::{self, Amount, First, Step, Stepped};
+use btfkit::store::{measurement, model};
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::given::Given;
+use super::given::{Given, expect_in_order};
 use super::tile::Seed;
 use super::{Console, bytes_text, number};
 
@@ -122,6 +123,10 @@ pub(super) struct Cluster {
 
 impl Cluster {
     pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.measurement, &[measurement::KIND]), (&self.model, &[model::KIND])],
+            &format!("btf cluster {} {}", self.model.display(), self.measurement.display()),
+        )?;
         let Self { measurement, model, options, seed, .. } = self;
         self.refuse_idle(given)?;
         if self.dry_run {

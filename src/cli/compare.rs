@@ -6,8 +6,9 @@ use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::{compare, image};
+use btfkit::store;
 use btfkit::store::measurement::Measurement;
-use btfkit::store::model::Model;
+use btfkit::store::model::{self, Model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::Args;
@@ -19,12 +20,12 @@ use super::{Console, as_json};
 #[derive(Args)]
 #[command(after_help = "\
 Example:
-  btf compare wood.model.zarr wood.zarr --picture side.png --light 15,0 --view 0,0")]
+  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0")]
 pub(super) struct Compare {
-    /// The model
-    model: PathBuf,
     /// The measurement
     measurement: PathBuf,
+    /// The model; the two may also come the other way round
+    model: PathBuf,
     /// Also write a picture of the measured tile, the model's tile, and four times their difference: .png, .jpg, .webp
     /// or .tif
     #[arg(long, value_name = "FILE")]
@@ -43,7 +44,11 @@ pub(super) struct Compare {
 impl Compare {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
-        let options = compare::Options { model: self.model.clone(), measurement: self.measurement.clone() };
+        // Both are read, so what they are tells which is which.
+        let named = [&self.measurement, &self.model];
+        let swapped = store::kind_of(named[0]).is_ok_and(|kind| kind == model::KIND);
+        let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
+        let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
         let report = compare::run(&model, &measurement, context)?;
         if self.json {
@@ -69,8 +74,11 @@ impl Compare {
             if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
-                     texels of several hues share some of them; more clusters help (btf cluster --clusters N --force)",
-                    report.all.ciede2000, report.all.lightness
+                     texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
+                    report.all.ciede2000,
+                    report.all.lightness,
+                    measurement.path().display(),
+                    model.path().display()
                 ));
             }
             if report.all.samples_left_out > 0 {

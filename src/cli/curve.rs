@@ -6,9 +6,11 @@ use btfkit::method::cluster::lloyd::Limits;
 use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::stage::cluster::curve;
+use btfkit::store::{measurement, model};
 use btfkit::words::counted;
 use clap::Args;
 
+use super::given::expect_in_order;
 use super::table::{row, table};
 use super::{Console, as_json, bytes_text};
 
@@ -43,6 +45,10 @@ pub(super) struct Curve {
 
 impl Curve {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.measurement, &[measurement::KIND]), (&self.model, &[model::KIND])],
+            &format!("btf curve {} {}", self.model.display(), self.measurement.display()),
+        )?;
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         let plan = curve::plan(&curve::Options {
             measurement: self.measurement.clone(),

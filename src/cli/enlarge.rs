@@ -12,6 +12,7 @@ use btfkit::store::model;
 use clap::{Args, ValueEnum};
 
 use super::each::{Ended, Line, each};
+use super::given::Given;
 use super::outputs::{Naming, Pair};
 use super::{Console, bytes_text, number};
 
@@ -104,8 +105,8 @@ enum Method {
 }
 
 impl Enlarge {
-    pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<Ended> {
-        self.refuse_options_of_others()?;
+    pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
+        self.refuse_options_of_others(given)?;
         let naming = Naming { reads: model::KIND, ending: Some(".model.zarr"), becomes: ".enlarged.zarr" };
         let pairs = naming.pairs(&self.paths, self.into.as_deref())?;
         if let [pair] = pairs.as_slice() {
@@ -144,9 +145,10 @@ impl Enlarge {
     }
 
     /// Refuses options that the method does not take.
-    fn refuse_options_of_others(&self) -> Result<()> {
+    fn refuse_options_of_others(&self, given: &Given) -> Result<()> {
         use Method::{Coherent, Paper, Quilt, Repeat, Roller, Tiles};
-        let options: [(bool, &str, &[Method]); 5] = [
+        let options: [(bool, &str, &[Method]); 6] = [
+            (given.has("seed"), "--seed", &[Coherent, Paper, Tiles, Roller, Quilt]),
             (self.jitter.is_some(), "--jitter", &[Coherent]),
             (self.no_source, "--no-source", &[Coherent, Repeat, Tiles, Roller, Quilt]),
             (self.tiles.is_some(), "--tiles", &[Tiles]),

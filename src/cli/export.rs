@@ -100,6 +100,15 @@ impl Export {
             )
             .hint("leave out --to, or name the result otherwise"));
         }
+        // Both of Bonn's containers are called .btf.
+        let goes_by = if format == Format::Fmf { Format::Dfmf } else { format };
+        if of_name(&self.output).is_some_and(|named| named != goes_by) {
+            let output = self.output.display();
+            return Err(Error::usage(format!(
+                "{output}: --to asks for another format than this ending stands for"
+            ))
+            .hint("leave out --to, or name the result otherwise"));
+        }
         let (what, used) = match format {
             Format::Ubo2003 => ("a zip of JPEGs", "quality"),
             Format::Dfmf | Format::Fmf => ("a Bonn container", "rank"),

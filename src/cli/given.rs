@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, Result};
 use btfkit::store;
+use btfkit::store::recognise::article;
 use clap::parser::ValueSource;
 
 use super::help;
@@ -39,6 +40,11 @@ impl Given {
         }
     }
 
+    /// Whether an option was given, by its name in the program.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|(id, _)| id == name)
+    }
+
     /// Refuses these options.
     pub(super) fn refuse_these(&self, idle: &[&str], why: &str) -> Result<()> {
         self.refuse(|name| idle.contains(&name), why, "")
@@ -60,6 +66,25 @@ impl Given {
             }
             _ => Ok(()),
         }
+    }
+}
+
+/// A store that a command names, and the kinds that it may be of.
+pub(super) type Expected<'a> = (&'a Path, &'a [&'a str]);
+
+/// Refuses two stores that are named in each other's place; `line` is the command as it was meant.
+pub(super) fn expect_in_order([first, second]: [Expected<'_>; 2], line: &str) -> Result<()> {
+    let is = |path: &Path, kinds: &[&str]| kind_at(path).filter(|kind| kinds.contains(kind));
+    match (is(first.0, second.1), is(second.0, first.1)) {
+        (Some(of_first), Some(of_second)) => Err(Error::usage(format!(
+            "{} is {} and {} is {}, expected them the other way round",
+            first.0.display(),
+            article(of_first),
+            second.0.display(),
+            article(of_second)
+        ))
+        .hint(line)),
+        _ => Ok(()),
     }
 }
 

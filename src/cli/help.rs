@@ -68,7 +68,12 @@ pub(super) fn explained(mut error: clap::Error) -> clap::Error {
     if let Some(name) = name.filter(|_| error.kind() == ErrorKind::UnknownArgument)
         && error.get(ContextKind::Usage).is_some_and(|usage| usage.to_string().contains("--out <"))
     {
-        let tip = format!("to write the result there, use --out {}", escaped(&name));
+        let out_is_given =
+            std::env::args_os().any(|word| word.to_string_lossy().split('=').next() == Some("--out"));
+        let tip = match out_is_given {
+            true => format!("one store is shown at a time, and --out is given: leave out {}", escaped(&name)),
+            false => format!("to write the result there, use --out {}", escaped(&name)),
+        };
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
         return error;
     }

@@ -174,9 +174,22 @@ impl Import {
                 samples.name()
             )
         });
+        let options = source.reading().options();
+        let read_with = (!options.is_empty()).then(|| format!("read with {}", options.join(" ")));
+        let found = (report.views_found > 0).then(|| {
+            format!(
+                "what was found done was not read again: btf verify {} reads all of it",
+                job.store.display()
+            )
+        });
         let assumed = source.contents().assumptions.iter().map(|text| format!("assumed: {text}"));
-        let remarks =
-            btfkit::archive::notes(source.as_ref()).into_iter().chain(assumed).chain(lost).collect();
+        let remarks = btfkit::archive::notes(source.as_ref())
+            .into_iter()
+            .chain(assumed)
+            .chain(lost)
+            .chain(read_with)
+            .chain(found)
+            .collect();
         Ok(Some((plan.description().clone(), report, remarks)))
     }
 

@@ -195,6 +195,9 @@ fn of_measurement(about: &Measured) -> Rows {
     rows.push(row!["views done", format!("{} of {}", about.views_done, about.samples.views.count)]);
     rows.push(row!["codec", about.codec]);
     rows.extend(about.archive.iter().map(|format| row!["archive", format]));
+    if !about.read_with.is_empty() {
+        rows.push(row!["read with", about.read_with.join(" ")]);
+    }
     rows.push(row!["digest", about.digest]);
     rows.extend(of_kept(&about.kept));
     rows.extend(about.assumptions.iter().map(|assumption| row!["assumed", assumption]));
@@ -212,15 +215,24 @@ fn pairs<T: std::fmt::Display>(list: &[[T; 2]]) -> String {
     if pairs.is_empty() { "none".to_owned() } else { pairs.join(";") }
 }
 
+/// A value of a recipe for people.
+fn in_words(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Object(members) => {
+            let members = members.iter().map(|(name, value)| format!("{name} {}", in_words(value)));
+            members.collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    }
+}
+
 fn of_model(about: &Modelled) -> Rows {
     let mut rows = vec![row!["kind", "model"]];
     let asked = |stage: &str, name: &str| {
         let recipe =
             about.stages.iter().find(|done| done.stage == stage).and_then(|done| done.recipe.as_ref());
-        recipe.and_then(|recipe| recipe.get(name)).filter(|value| !value.is_null()).map(|value| match value {
-            Value::String(text) => text.clone(),
-            other => other.to_string(),
-        })
+        recipe.and_then(|recipe| recipe.get(name)).filter(|value| !value.is_null()).map(in_words)
     };
     for done in &about.stages {
         let word = match (done.done, done.recipe.is_some()) {

@@ -6,10 +6,12 @@ use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
+use btfkit::store::{enlarged, measurement, model};
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
+use super::given::expect_in_order;
 use super::table::{row, table};
 use super::{Console, as_json};
 
@@ -53,6 +55,10 @@ pub(super) struct Judge {
 
 impl Judge {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.subject, &[model::KIND, enlarged::KIND]), (&self.against, &[measurement::KIND])],
+            &format!("btf judge {} --against {}", self.against.display(), self.subject.display()),
+        )?;
         if let Some(path) = &self.picture {
             Ending::of(path, &Ending::DISPLAY)?;
         }

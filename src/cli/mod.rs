@@ -295,7 +295,7 @@ impl Command {
             Self::Status(command) => return command.run(context, console),
             Self::Missing(command) => command.run(console),
             Self::Model(command) => return command.run(context, console),
-            Self::Enlarge(command) => return command.run(context, console),
+            Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),
             Self::Sample(command) => command.run(context, console),
             Self::Export(command) => command.run(given, context, console),
@@ -462,7 +462,7 @@ mod tests {
 
     use clap::CommandFactory;
 
-    use super::option_effects::{COMMON, Effect, OUTPUTS, RECIPES, Shown, WITHOUT};
+    use super::option_effects::{COMMON, Effect, OUTPUTS, READING, RECIPES, Shown, WITHOUT};
     use super::*;
 
     #[test]
@@ -501,8 +501,13 @@ mod tests {
             }
             let recipes = RECIPES.iter().filter(|of| of.command == name).flat_map(|of| of.options);
             let outputs = OUTPUTS.iter().filter(|of| of.command == name).flat_map(|of| of.options);
-            let told: BTreeSet<&str> =
-                recipes.map(|(option, _)| *option).chain(outputs.map(|(option, _)| *option)).collect();
+            let reads = OUTPUTS.iter().any(|of| of.command == name && of.reads);
+            let reading = if reads { READING } else { &[] };
+            let told: BTreeSet<&str> = recipes
+                .map(|(option, _)| *option)
+                .chain(outputs.map(|(option, _)| *option))
+                .chain(reading.iter().copied())
+                .collect();
             let found: BTreeSet<&str> =
                 command.get_arguments().map(|a| a.get_id().as_str()).filter(|option| own(option)).collect();
             assert_eq!(found, told, "options of btf {name} and their entries in option_effects.rs");

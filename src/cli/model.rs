@@ -108,7 +108,7 @@ impl Model {
         begin(Stage::Appearance);
         let plan = appearance_plan(model, &self.tile.lattice)?;
         let (found, appearance) = (plan.is_done(), plan.run(context)?);
-        print(found, &|console| print_appearance(&appearance, console));
+        print(found, &|console| print_appearance(&appearance, model, console));
         context.progress.stage(None);
         Ok(Some(clusters.clusters))
     }

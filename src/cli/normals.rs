@@ -3,10 +3,12 @@ use std::path::{Path, PathBuf};
 use btfkit::error::Result;
 use btfkit::run::Context;
 use btfkit::stage::normals;
+use btfkit::store::{measurement, model};
 use btfkit::words::counted;
 use clap::Args;
 
 use super::Console;
+use super::given::expect_in_order;
 
 #[derive(Args)]
 pub(super) struct NormalsOptions {
@@ -35,6 +37,10 @@ pub(super) struct Normals {
 
 impl Normals {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.measurement, &[measurement::KIND]), (&self.model, &[model::KIND])],
+            &format!("btf normals {} {}", self.model.display(), self.measurement.display()),
+        )?;
         let plan = normals_plan(&self.measurement, &self.model, &self.options)?;
         if self.dry_run {
             return console.plan(&plan.summary());

@@ -68,6 +68,20 @@ impl Sample {
             return Err(Error::usage(format!("{named}: btf sample writes a zip, which is no store"))
                 .hint(format!("btf sample {archive}, then btf import {archive} {named}")));
         }
+        let ending = self.archive.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let is_folder = self.archive.is_dir() || self.archive.to_string_lossy().ends_with('/');
+        if is_folder || ending.is_some_and(|ending| ending != "zip") {
+            let name = match is_folder {
+                true => self.archive.join("sample.zip"),
+                false => self.archive.with_extension("zip"),
+            };
+            let what = if is_folder { "a folder" } else { "another ending" };
+            return Err(Error::usage(format!(
+                "{}: got {what}, expected the name of a zip, which is what btf sample writes",
+                self.archive.display()
+            ))
+            .hint(format!("btf sample {}", name.display())));
+        }
         let report = sample::run(
             &sample::Options {
                 archive: self.archive.clone(),

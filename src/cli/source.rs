@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use btfkit::archive::adapt::{Adaptation, Mirrored, Type};
-use btfkit::archive::{self, Source};
+use btfkit::archive::adapt::{Adaptation, Side, Type};
+use btfkit::archive::{self, Reading, Source};
 use btfkit::color::Transfer;
 use btfkit::error::Result;
 use btfkit::store::recognise::expect_readable;
@@ -22,6 +22,9 @@ pub(super) struct SourceArgs {
     /// Convert samples to this type [default: keep theirs]
     #[arg(long, value_enum)]
     samples: Option<SampleName>,
+    /// Which polar angles of the archive are elevations: 90 degrees is from above, not theta, where 0 is
+    #[arg(long, value_enum)]
+    polar: Option<Polar>,
     /// Which azimuths of the archive run clockwise
     #[arg(long, value_enum)]
     azimuth: Option<Azimuth>,
@@ -55,6 +58,9 @@ pub(super) struct SourceArgs {
     /// Leave out the view of this number, from 0; repeat the option for more
     #[arg(long, value_name = "N")]
     drop_view: Vec<usize>,
+    /// Leave out the light of this number, from 0; repeat the option for more
+    #[arg(long, value_name = "N")]
+    drop_light: Vec<usize>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -69,6 +75,13 @@ enum SampleName {
     U16,
     F16,
     F32,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Polar {
+    Elevation,
+    ElevationLights,
+    ElevationViews,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -96,11 +109,17 @@ impl SourceArgs {
     fn adaptation(&self) -> Adaptation {
         Adaptation {
             drop_views: self.drop_view.clone(),
+            drop_lights: self.drop_light.clone(),
             swap: self.swap,
+            elevations: self.polar.map(|polar| match polar {
+                Polar::Elevation => Side::Both,
+                Polar::ElevationLights => Side::Lights,
+                Polar::ElevationViews => Side::Views,
+            }),
             mirrored: self.azimuth.map(|azimuth| match azimuth {
-                Azimuth::Mirrored => Mirrored::Both,
-                Azimuth::MirroredLights => Mirrored::Lights,
-                Azimuth::MirroredViews => Mirrored::Views,
+                Azimuth::Mirrored => Side::Both,
+                Azimuth::MirroredLights => Side::Lights,
+                Azimuth::MirroredViews => Side::Views,
             }),
             turn_deg: self.turn.as_ref().and_then(|turn| turn.parse().ok()).unwrap_or(0),
             transpose: self.transpose,
@@ -120,19 +139,25 @@ impl SourceArgs {
 
     /// Opens the archive at one path, or in pieces at several.
     pub(super) fn open(&self, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
-        paths.iter().try_for_each(|path| expect_readable(path))?;
-        archive::open(paths, &self.options()).map_err(|error| match paths {
-            [folder] if holds_archives(folder) => {
-                let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
-                let each = folder.join("*");
-                error.hint(format!(
-                    "{todo}if its archives are a measurement each, name them: {}",
-                    each.display()
-                ))
-            }
-            _ => error,
-        })
+        open(paths, &self.options())
     }
+
+    /// The same by the reading that a store was made by, unless another one is asked for.
+    pub(super) fn open_as_in(&self, reading: Reading, paths: &[PathBuf]) -> Result<Box<dyn Source>> {
+        open(paths, &self.options().or_as_in(reading))
+    }
+}
+
+fn open(paths: &[PathBuf], options: &archive::Options) -> Result<Box<dyn Source>> {
+    paths.iter().try_for_each(|path| expect_readable(path))?;
+    archive::open(paths, options).map_err(|error| match paths {
+        [folder] if holds_archives(folder) => {
+            let todo = error.guidance().map_or(String::new(), |hint| format!("{hint}; "));
+            let each = folder.join("*");
+            error.hint(format!("{todo}if its archives are a measurement each, name them: {}", each.display()))
+        }
+        _ => error,
+    })
 }
 
 /// Whether a folder holds several archives that are one file each.

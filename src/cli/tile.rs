@@ -4,9 +4,11 @@ use btfkit::error::Result;
 use btfkit::lattice::{LatticeChoice, WaveCounts};
 use btfkit::run::Context;
 use btfkit::stage::tile;
+use btfkit::store::{measurement, model};
 use clap::Args;
 
 use super::Console;
+use super::given::expect_in_order;
 
 /// Of a plane of which the tile is less than this, more is worth having.
 const LITTLE: f64 = 0.5;
@@ -59,6 +61,10 @@ pub(super) struct Tile {
 
 impl Tile {
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
+        expect_in_order(
+            [(&self.measurement, &[measurement::KIND]), (&self.model, &[model::KIND])],
+            &format!("btf tile {} {}", self.model.display(), self.measurement.display()),
+        )?;
         let plan = tile_plan(&self.measurement, &self.model, &self.options, self.seed.seed)?;
         if self.dry_run {
             return console.plan(&plan.summary());

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
+use btfkit::store::measurement::Measurement;
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
@@ -20,7 +21,7 @@ Everything is read: every chunk of every array, and all metadata, which must agr
 
 Examples:
   btf verify wood.zarr
-  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample; give the options that the import was given
+  btf verify wood.zarr --source UBO_WOOD256.zip     sample by sample, read as it was imported
   btf verify wood.model.zarr
   btf verify wood-4k.zarr                           with its model, which lies beside it or is named by --model
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
@@ -74,7 +75,14 @@ impl Verify {
 
     /// Looks at one store or pyramid.
     fn look(&self, path: &Path, context: &Context<'_>) -> Result<Found> {
-        let source = if self.archive.is_empty() { None } else { Some(self.source.open(&self.archive)?) };
+        let source = if self.archive.is_empty() {
+            None
+        } else {
+            let reading = Measurement::open(path)
+                .map(|store| store.recipe().how_read().unwrap_or_default())
+                .unwrap_or_default();
+            Some(self.source.open_as_in(reading, &self.archive)?)
+        };
         verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
     }
 }
@@ -143,6 +151,10 @@ fn of_measurement(report: &measurement::Report, views: usize) -> String {
     for (view, light) in &report.different_images {
         text.push_str(&format!("\ndifferent: view {view}, light {light}"));
     }
+    let more = report.images_different.saturating_sub(report.different_images.len());
+    if more > 0 {
+        text.push_str(&format!("\nand {more} more"));
+    }
     text
 }
 
@@ -160,7 +172,10 @@ fn judge(store: &Path, found: &Found) -> Result<()> {
             match report.different {
                 Some(count) if count > 0 => {
                     let what = format!("{store}: {} unlike the archive's", counted(count, "sample"));
-                    return Err(Error::input(what));
+                    return Err(Error::input(what).hint(
+                        "the archive is read as it was imported unless an option here asks for another reading; \
+                         --pattern and --table are to be given again",
+                    ));
                 }
                 _ => {}
             }

@@ -152,7 +152,12 @@ fn first_difference(old: &Value, new: &Value, place: &str) -> Option<String> {
     (old != new).then(|| match (old.as_str(), new.as_str()) {
         // Of what was made before only the digest is known.
         (Some(old), Some(new)) if is_digest(old) && is_digest(new) => format!(
-            "its {place} was made anew since, or is another one (digest {}, now {})",
+            "its {place} {} (digest {}, now {})",
+            // Such as "images".
+            match place.ends_with('s') {
+                true => "were made anew since, or are others",
+                false => "was made anew since, or is another one",
+            },
             shortened(old),
             shortened(new)
         ),

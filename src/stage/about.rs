@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::error::Result;
+use crate::method::coherent::JITTER_ONE;
 pub use crate::stage::deepzoom::Pyramidal;
 pub use crate::stage::kept::Kept;
 use crate::stage::kept::bytes_below;
@@ -109,6 +110,8 @@ pub struct Measured {
     pub digest: String,
     /// What its archive was.
     pub archive: Option<String>,
+    /// The options by which its archive was read, as `btf import` takes them.
+    pub read_with: Vec<String>,
     /// What had to be assumed.
     pub assumptions: Vec<String>,
 }
@@ -224,6 +227,7 @@ fn of_measurement(measurement: &Measurement, kept: impl Fn(u64, bool) -> Kept) -
         views_done,
         digest: measurement.digest().to_owned(),
         archive: Some(recipe.format.clone()).filter(|format| !format.is_empty()),
+        read_with: recipe.how_read().unwrap_or_default().options(),
         assumptions: recipe.assumptions.clone(),
     }
 }
@@ -256,7 +260,8 @@ fn of_enlarged(enlarged: &Enlarged, kept: impl Fn(u64, bool) -> Kept) -> Grown {
     let recipe = enlarged.recipe();
     let options = [
         ("candidates", recipe.candidates.map(Value::from)),
-        ("jitter", recipe.jitter.map(Value::from)),
+        // In units of the spacing, as the option has it.
+        ("jitter", recipe.jitter.map(|jitter| Value::from(f64::from(jitter) / f64::from(JITTER_ONE)))),
         ("tiles", recipe.tiles.map(Value::from)),
     ];
     let (done, total) = (enlarged.shards_done(), enlarged.shards().texels());

@@ -220,7 +220,7 @@ pub(super) fn another_kind(path: &Path, found: &Value, kinds: &[&str]) -> Error 
 }
 
 /// A kind of store as a sentence names it.
-fn article(kind: &str) -> String {
+pub fn article(kind: &str) -> String {
     match kind {
         enlarged::KIND => "an enlarged index".to_owned(),
         measurement::KIND | model::KIND => format!("a {kind}"),

@@ -343,3 +343,126 @@ fn highlights_that_an_import_cuts_off_are_told_with_the_option_that_keeps_them()
     let told = succeed(&mut run(&["import"], &[&npy, &at("f16.zarr")], &["--samples", "f16"]));
     assert!(!told.contains("became white"), "{told}");
 }
+
+#[test]
+fn stores_in_each_others_place_are_told_with_the_command_that_was_meant() {
+    let fixture = fixture();
+    let folder = tempfile::tempdir().unwrap();
+    let [measurement, model, enlarged] = [fixture.measurement(), fixture.model(), fixture.enlarged()];
+    let of_model: [(&str, &[&str]); 4] = [("tile", &[]), ("cluster", &[]), ("normals", &[]), ("curve", &[])];
+    for (command, options) in of_model {
+        let told = fail(run(&[command], &[&model, &measurement], options).current_dir(folder.path()), 2);
+        let meant = format!("btf {command} {} {}", measurement.display(), model.display());
+        assert!(told.contains("the other way round") && told.contains(&meant), "{told}");
+    }
+    for subject in [&model, &enlarged] {
+        let told = fail(&mut run(&["judge"], &[&measurement, Path::new("--against"), subject], &[]), 2);
+        let meant = format!("btf judge {} --against {}", subject.display(), measurement.display());
+        assert!(told.contains(&meant), "{told}");
+    }
+}
+
+#[test]
+fn names_of_results_that_mean_something_else_are_refused_with_one_that_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::create_dir(at("folder")).unwrap();
+    let small = ["--size", "8x8", "--views", "1", "--lights", "2"];
+    for name in ["folder", "folder/", "new/", "s.tar", "s.btf", "s.v2"] {
+        let told = fail(btf().arg("sample").arg(at(name)).args(small), 2);
+        let meant = told.split("btf sample ").last().unwrap().trim();
+        assert!(meant.ends_with(".zip"), "{told}");
+        if !name.starts_with("new") {
+            succeed(btf().arg("sample").arg(meant).args(small).arg("--force"));
+        }
+    }
+    let measurement = fixture().measurement();
+    for (name, format) in [("x.npy", "png"), ("x.h5", "exr"), ("x.zip", "npy"), ("x.btf", "hdf5")] {
+        let told = fail(btf().arg("export").args([&measurement, &at(name)]).args(["--to", format]), 2);
+        assert!(told.contains("leave out --to") && !at(name).exists(), "{told}");
+    }
+    let told = fail(btf().arg("image").args([&fixture().model(), &at("x.png")]), 2);
+    assert!(told.contains("use --out"), "{told}");
+    let told =
+        fail(btf().arg("image").args([&fixture().model(), &at("x.png")]).arg("--out").arg(at("y.png")), 2);
+    assert!(told.contains("leave out") && !told.contains("use --out"), "{told}");
+}
+
+#[test]
+fn the_lattice_that_a_warning_asks_for_can_be_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("m.zarr");
+    copy(&fixture().model(), &model);
+    let lattice = ["--lattice", "8,0;0,8"];
+    // As the warnings of enlarge say it; without --force another lattice is another recipe.
+    fail(btf().arg("appearance").arg(&model).args(lattice), 65);
+    succeed(btf().arg("appearance").arg(&model).arg("--force").args(lattice));
+    succeed(btf().arg("appearance").arg(&model).args(["--lattice", "none", "--force"]));
+    let measurement = fixture().measurement();
+    succeed(btf().arg("model").args([&measurement, &model]).args(["--force", "--tile", "none"]));
+}
+
+#[test]
+fn a_pattern_is_advised_only_where_it_reads_all_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let archive = folder.path().join("s.zip");
+    succeed(btf().arg("sample").arg(&archive).args(["--size", "8x8", "--views", "2", "--lights", "3"]));
+    let files = crate::fixture::unpack(&archive, &folder.path().join("unpacked"));
+    let advice = |name: &dyn Fn(usize, &str) -> String| {
+        let set = folder.path().join("set");
+        drop(std::fs::remove_dir_all(&set));
+        std::fs::create_dir(&set).unwrap();
+        for (number, file) in files.iter().enumerate() {
+            let stem = file.file_stem().unwrap().to_str().unwrap();
+            std::fs::copy(file, set.join(format!("{}.jpg", name(number, stem)))).unwrap();
+        }
+        (set.clone(), fail(btf().arg("info").arg(&set), 65))
+    };
+    // The last digits only count.
+    let (set, told) = advice(&|number, stem| format!("{stem}_{number}"));
+    let pattern = told.split("--pattern '").nth(1).and_then(|rest| rest.split('\'').next());
+    let pattern = pattern.unwrap_or_else(|| panic!("no pattern in {told}")).replace('\n', " ");
+    succeed(btf().arg("info").arg(&set).args(["--pattern", &pattern]));
+    // Decimal commas are fractions, which no pattern reads.
+    let (_, told) = advice(&|_, stem| stem.replace(" tv", ",5 tv"));
+    assert!(!told.contains("--pattern") && told.contains("--table"), "{told}");
+    let (_, told) = advice(&|_, stem| stem.replace(" tv", "_5 tv"));
+    assert!(!told.contains("--pattern") && told.contains("--table"), "{told}");
+}
+
+#[test]
+fn arrays_without_directions_are_told_of_the_lists_that_they_can_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let array = folder.path().join("a.npy");
+    succeed(btf().arg("export").args([&fixture().measurement(), &array]));
+    std::fs::remove_file(folder.path().join("a.views.npy")).unwrap();
+    let told = fail(btf().arg("info").arg(&array), 65);
+    assert!(told.contains("NAME.views.npy") && !told.contains("uniform"), "{told}");
+}
+
+#[test]
+fn a_tile_that_is_mostly_black_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let array = at("a.npy");
+    succeed(btf().arg("export").args([&fixture().measurement(), &array]));
+    let enlarged = |name: &str| {
+        let [store, model, large] = ["", ".model", ".large"].map(|kind| at(&format!("{name}{kind}.zarr")));
+        succeed(btf().arg("import").args([&array, &store]));
+        let plain = ["--tile", "none", "--clusters", "16", "--levels", "1"];
+        succeed(btf().arg("model").args([&store, &model]).args(plain));
+        succeed(btf().arg("enlarge").args([&model, &large]).args(["--size", "96x96"]))
+    };
+    assert!(!enlarged("plain").contains("are black"));
+    // Three of four columns become black in every image.
+    let mut bytes = std::fs::read(&array).unwrap();
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    for (at, sample) in bytes[header..].iter_mut().enumerate() {
+        if at / 3 % 56 >= 14 {
+            *sample = 0;
+        }
+    }
+    std::fs::write(&array, bytes).unwrap();
+    let told = enlarged("black");
+    assert!(told.contains("75 % of the tile are black") && told.contains("crop the pictures"), "{told}");
+}

@@ -213,6 +213,9 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
     let mirror = |directions: &mut Vec<btfkit_formats::Direction>| {
         directions.iter_mut().for_each(|direction| direction.phi_rad = -direction.phi_rad);
     };
+    let elevated = |directions: &mut Vec<btfkit_formats::Direction>| {
+        directions.iter_mut().for_each(|d| d.theta_rad = std::f64::consts::FRAC_PI_2 - d.theta_rad);
+    };
     let case = |name, source, code, repair, places| Case { name, source, code, repair, places };
     let good = || base.as_they_are();
     let here = move |v: usize, l: usize| (v, l) == (view, light);
@@ -256,6 +259,30 @@ fn cases(base: &Photographs) -> Vec<Case<'_>> {
                 .described(|d| std::mem::swap(&mut d.views, &mut d.lights)),
             "light-view-swapped",
             Some("--swap"),
+            vec![],
+        ),
+        case(
+            "lights and views by elevation",
+            good().described(|d| {
+                elevated(&mut d.lights);
+                elevated(&mut d.views);
+            }),
+            "elevations",
+            Some("--polar elevation"),
+            vec![],
+        ),
+        case(
+            "lights by elevation",
+            good().described(|d| elevated(&mut d.lights)),
+            "light-elevations",
+            Some("--polar elevation-lights"),
+            vec![],
+        ),
+        case(
+            "views by elevation",
+            good().described(|d| elevated(&mut d.views)),
+            "view-elevations",
+            Some("--polar elevation-views"),
             vec![],
         ),
         case(
@@ -469,6 +496,8 @@ fn each_fault_in_wallpaper_is_found() {
             ("views mirrored", &[]),
             ("views turned by 180 degrees", &[]),
             ("exposure of one image", &[]),
+            // It is as bright from everywhere, so that the views do not tell.
+            ("views by elevation", &[]),
         ],
     );
 }

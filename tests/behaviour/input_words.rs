@@ -141,7 +141,8 @@ fn options_that_an_archive_has_no_use_for_are_refused() {
         ("a.npy", &["--order", "ubo81"], "without directions of their own"),
         ("a.npy", &["--rows", "reversed"], "Bonn's containers"),
         ("a.btf", &["--order", "ubo81"], "BIG and MIF"),
-        ("a.btf", &["--hdr", "atrium"], "it is for pictures"),
+        ("a.btf", &["--hdr", "atrium"], "Radiance pictures"),
+        ("a.zip", &["--hdr", "atrium"], "Radiance pictures"),
         ("a.zip", &["--rows", "reversed"], "Bonn's containers"),
         ("a.zip", &["--order", "ubo81"], "BIG and MIF"),
     ] {

@@ -46,7 +46,9 @@ pub(crate) struct Outputs {
     /// The arguments that it cannot be without; `{archive}`, `{measurement}`, `{model}`, `{enlarged}` and `{new}`, a
     /// folder, stand for places.
     pub(crate) base: &'static [&'static str],
-    /// Each of its options and arguments, by its name in the program.
+    /// Whether it reads archives, so that it has the options of [`READING`], too.
+    pub(crate) reads: bool,
+    /// Each of its other options and arguments, by its name in the program; and those of them that are tried here.
     pub(crate) options: &'static [(&'static str, Shown)],
 }
 
@@ -54,13 +56,33 @@ use Shown::{Shows, Unseen};
 
 const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
-const READING: Shown = Unseen("as of import, whose recipes show it; refused for stores");
+
+/// The options of every command that reads archives. What they do to the result is seen in the recipes of import; for
+/// stores they are refused.
+pub(crate) const READING: &[&str] = &[
+    "transfer",
+    "samples",
+    "polar",
+    "azimuth",
+    "turn",
+    "transpose",
+    "swap",
+    "cosine",
+    "pattern",
+    "table",
+    "order",
+    "rows",
+    "hdr",
+    "drop_view",
+    "drop_light",
+];
 
 /// All commands whose results have none.
 pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "sample",
         base: &["{new}/s.zip", "--size", "8x8", "--views", "2", "--lights", "2"],
+        reads: false,
         options: &[
             ("archive", ITSELF),
             ("material", Shows(&["--material", "wood"], &[])),
@@ -74,21 +96,13 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "info",
         base: &["{archive}"],
+        reads: true,
         options: &[
             ("paths", ITSELF),
             ("pieces", Unseen("of archives in pieces")),
             ("transfer", Shows(&["--transfer", "linear"], &[])),
             ("samples", Shows(&["--samples", "f16"], &[])),
-            ("azimuth", READING),
-            ("turn", READING),
-            ("transpose", READING),
             ("swap", Shows(&["--swap"], &[])),
-            ("cosine", READING),
-            ("pattern", READING),
-            ("table", READING),
-            ("order", READING),
-            ("rows", READING),
-            ("hdr", READING),
             ("drop_view", Shows(&["--drop-view", "1"], &[])),
             ("json", Shows(&["--json"], &[])),
         ],
@@ -96,34 +110,24 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "check",
         base: &["{archive}"],
+        reads: true,
         options: &[
             ("paths", ITSELF),
             ("pieces", Unseen("of archives in pieces")),
             ("picture", Shows(&["--picture", "{new}/p.png"], &[])),
-            ("transfer", READING),
-            ("samples", READING),
-            ("azimuth", READING),
-            ("turn", READING),
-            ("transpose", READING),
-            ("swap", READING),
-            ("cosine", READING),
-            ("pattern", READING),
-            ("table", READING),
-            ("order", READING),
-            ("rows", READING),
-            ("hdr", READING),
-            ("drop_view", READING),
             ("json", Shows(&["--json"], &[])),
         ],
     },
     Outputs {
         command: "status",
         base: &["{measurement}"],
+        reads: false,
         options: &[("stores", ITSELF), ("json", Shows(&["--json"], &[]))],
     },
     Outputs {
         command: "missing",
         base: &["{measurement}", "--shards", "4"],
+        reads: false,
         options: &[
             ("store", ITSELF),
             ("shards", Unseen("nothing is missing; shares::what_is_missing_is_told tries it")),
@@ -133,29 +137,18 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "verify",
         base: &["{measurement}"],
+        reads: true,
         options: &[
             ("stores", ITSELF),
             ("model", Unseen("another model is refused, the right one is found without")),
             ("archive", Shows(&["--source", "{archive}"], &[])),
-            ("transfer", READING),
-            ("samples", READING),
-            ("azimuth", READING),
-            ("turn", READING),
-            ("transpose", READING),
-            ("swap", READING),
-            ("cosine", READING),
-            ("pattern", READING),
-            ("table", READING),
-            ("order", READING),
-            ("rows", READING),
-            ("hdr", READING),
-            ("drop_view", READING),
             ("json", Shows(&["--json"], &[])),
         ],
     },
     Outputs {
         command: "curve",
         base: &["{measurement}", "{model}", "--most", "4"],
+        reads: false,
         options: &[
             ("measurement", ITSELF),
             ("model", ITSELF),
@@ -168,6 +161,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "compare",
         base: &["{model}", "{measurement}"],
+        reads: false,
         options: &[
             ("model", ITSELF),
             ("measurement", ITSELF),
@@ -183,6 +177,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "image",
         base: &["{model}", "--out", "{new}/i.png"],
+        reads: false,
         options: &[
             ("source", ITSELF),
             ("out", Unseen("the name of the result, and its format")),
@@ -216,6 +211,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "judge",
         base: &["{enlarged}", "--against", "{measurement}", "--crop", "16", "--pair", "0,1"],
+        reads: false,
         options: &[
             ("subject", ITSELF),
             ("against", ITSELF),
@@ -257,6 +253,9 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (&["verify", "{model}", "--model", "{model}"], "--model"),
     (&["verify", "{model}", "--source", "{archive}"], "archive"),
     (&["info", "{measurement}", "--swap"], "--swap"),
+    (&["info", "{archive}", "--hdr", "atrium"], "--hdr"),
+    (&["check", "{archive}", "--rows", "reversed"], "--rows"),
+    (&["import", "{archive}", "{new}/x.zarr", "--order", "ubo81"], "--order"),
     (&["info", "--pieces", "{measurement}", "{measurement}"], "--pieces"),
     (&["check", "{measurement}", "--azimuth", "mirrored"], "--azimuth"),
     (&["check", "--pieces", "{measurement}", "{archive}"], "--pieces"),
@@ -274,6 +273,10 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (
         &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "paper", "--no-source"],
         "--no-source",
+    ),
+    (
+        &["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--method", "repeat", "--seed", "2"],
+        "--seed",
     ),
     (&["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--tiles", "3"], "--tiles"),
     (&["enlarge", "{model}", "{new}/e.zarr", "--size", "64x64", "--candidates", "3"], "--candidates"),
@@ -313,6 +316,7 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("into", PLACE),
             ("transfer", Changes(&["--transfer", "linear"])),
             ("samples", Changes(&["--samples", "u16"])),
+            ("polar", Changes(&["--polar", "elevation-lights"])),
             ("azimuth", Changes(&["--azimuth", "mirrored-lights"])),
             ("turn", Changes(&["--turn", "90"])),
             ("transpose", Changes(&["--transpose"])),
@@ -325,8 +329,9 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("table", Apart("the directions and the digest of the images in their order are in the recipe")),
             ("order", Apart("refused for pictures; recipes::options_of_some_formats_are_in_the_recipe")),
             ("rows", Apart("refused for pictures; recipes::options_of_some_formats_are_in_the_recipe")),
-            ("hdr", Changes(&["--hdr", "atrium"])),
+            ("hdr", Apart("refused for other pictures; recipes::options_of_some_formats_are_in_the_recipe")),
             ("drop_view", Changes(&["--drop-view", "1"])),
+            ("drop_light", Changes(&["--drop-light", "1"])),
             ("white", Changes(&["--white", "0.5"])),
             ("codec", Changes(&["--codec", "predictive"])),
             ("shard", Keeps(&["--shard", "0/2"])),

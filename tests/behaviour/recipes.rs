@@ -260,4 +260,17 @@ fn options_of_some_formats_are_in_the_recipe() {
     succeed(btf().arg("export").args([at("a.zarr"), at("a.btf")]));
     let [plain, reversed] = [&[][..], &["--rows", "reversed"]].map(|options| reading("a.btf", options));
     assert_ne!(plain, reversed);
+    // Two ways to read a Radiance picture whose header names X first; of another one there is one.
+    for (order, is_read) in [("+X 8 +Y 8", true), ("-Y 8 +X 8", false)] {
+        std::fs::create_dir_all(at("hdr")).unwrap();
+        let mut picture = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{order}\n").into_bytes();
+        picture.extend([100, 90, 80, 129].repeat(64));
+        std::fs::write(at("hdr/tl0 pl0 tv0 pv0.hdr"), picture).unwrap();
+        if is_read {
+            assert_ne!(reading("hdr", &[]), reading("hdr", &["--hdr", "atrium"]));
+        } else {
+            let told = fail(btf().arg("info").arg(at("hdr")).args(["--hdr", "atrium"]), 2);
+            assert!(told.contains("--hdr changes nothing"), "{told}");
+        }
+    }
 }

@@ -20,7 +20,7 @@ use std::ops::Range;
 use chunks::{Chunks, SIGNATURE};
 use layout::Layout;
 
-use crate::utia::{self, Colors, Grid, Order, transfer, with_capacity};
+use crate::utia::{self, Colors, Grid, Opened, Order, transfer};
 use crate::words::counted;
 use crate::{Assumption, Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
 
@@ -42,13 +42,9 @@ pub fn recognise(bytes: &[u8]) -> bool {
 /// An open BIG file.
 #[derive(Debug, Clone)]
 pub struct Big {
-    contents: Contents,
+    opened: Opened,
     layout: Layout,
-    grid: Grid,
     tile: u64,
-    unit: f32,
-    opened_bytes: usize,
-    limits: Limits,
 }
 
 impl Big {
@@ -126,37 +122,19 @@ impl Big {
             assumptions,
             remarks,
         };
-        Ok(Big {
-            contents,
-            layout,
-            grid,
-            tile: options.tile,
-            unit: colors.unit,
-            opened_bytes: bytes.len(),
-            limits: limits.clone(),
-        })
+        let opened = Opened { contents, grid, unit: colors.unit, bytes: bytes.len(), limits: limits.clone() };
+        Ok(Big { opened, layout, tile: options.tile })
     }
 }
 
 impl Images for Big {
     fn contents(&self) -> &Contents {
-        &self.contents
+        &self.opened.contents
     }
 
     fn read_images(&self, bytes: &[u8], view: usize, lights: Range<usize>) -> Result<Samples> {
-        request::check(&self.contents, self.opened_bytes, bytes, view, &lights)?;
-        let count = request::samples(&self.contents, lights.len(), &self.limits)?;
-        let mut samples = with_capacity(self.contents.sample_type, count);
-        for light in lights {
-            let image = self.grid.place(view, light).and_then(|place| u64::try_from(place).ok());
-            let read = image.and_then(|image| {
-                self.layout.append_image(bytes, [image, self.tile], self.unit, &mut samples)
-            });
-            if read.is_none() {
-                let found = format!("no data of view {view}, light {light}");
-                return Err(Error::new(ErrorKind::Argument, found, "the file that was opened"));
-            }
-        }
-        Ok(samples)
+        self.opened.read(bytes, view, lights, |place, unit, samples| {
+            self.layout.append_image(bytes, [u64::try_from(place).ok()?, self.tile], unit, samples)
+        })
     }
 }

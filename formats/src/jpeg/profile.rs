@@ -26,7 +26,7 @@ pub(crate) fn profile(bytes: &[u8]) -> Option<String> {
     if icc.is_empty() { exif.or(xmp) } else { profile::of_icc(&icc) }
 }
 
-/// What is said of pixels that are not square, a sentence.
+/// What is said of pixels that are not square (JFIF) and of samples (Exif), a sentence each.
 pub(crate) fn remarks(bytes: &[u8]) -> Vec<String> {
     let jfif = segments(bytes).find_map(|(code, segment)| {
         // Version and unit, then how many pixels there are to it, across and down.
@@ -41,7 +41,10 @@ pub(crate) fn remarks(bytes: &[u8]) -> Vec<String> {
             )
         })
     });
-    jfif.flatten().into_iter().collect()
+    let exif = segments(bytes)
+        .filter(|(code, _)| *code == marker::APP1)
+        .find_map(|(_, segment)| segment.strip_prefix(exif::MARK).map(exif::unapplied));
+    jfif.flatten().into_iter().chain(exif.unwrap_or_default()).collect()
 }
 
 /// Markers and segments before the first scan.

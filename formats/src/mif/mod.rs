@@ -12,8 +12,8 @@ use std::ops::Range;
 use chunks::{Chunks, Image, SIGNATURE};
 use description::Description;
 
-use crate::utia::{self, Colors, Grid, Order, transfer, with_capacity};
-use crate::{Assumption, Contents, Error, ErrorKind, Images, Limits, Result, Samples, request};
+use crate::utia::{self, Colors, Grid, Opened, Order, transfer};
+use crate::{Assumption, Contents, Error, Images, Limits, Result, Samples, request};
 
 /// What the caller chooses, or knows about a file that the file does not say.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -33,13 +33,9 @@ pub fn recognise(bytes: &[u8]) -> bool {
 /// An open MIF file.
 #[derive(Debug, Clone)]
 pub struct Mif {
-    contents: Contents,
+    opened: Opened,
     /// In the order of the pairs that the grid was made of.
     images: Vec<Image>,
-    grid: Grid,
-    unit: f32,
-    opened_bytes: usize,
-    limits: Limits,
 }
 
 impl Mif {
@@ -111,35 +107,21 @@ impl Mif {
             assumptions,
             remarks,
         };
-        Ok(Mif {
-            contents,
-            images,
-            grid,
-            unit: colors.unit,
-            opened_bytes: bytes.len(),
-            limits: limits.clone(),
-        })
+        let opened = Opened { contents, grid, unit: colors.unit, bytes: bytes.len(), limits: limits.clone() };
+        Ok(Mif { opened, images })
     }
 }
 
 impl Images for Mif {
     fn contents(&self) -> &Contents {
-        &self.contents
+        &self.opened.contents
     }
 
     fn read_images(&self, bytes: &[u8], view: usize, lights: Range<usize>) -> Result<Samples> {
-        request::check(&self.contents, self.opened_bytes, bytes, view, &lights)?;
-        let count = request::samples(&self.contents, lights.len(), &self.limits)?;
-        let mut samples = with_capacity(self.contents.sample_type, count);
-        for light in lights {
-            let image = self.grid.place(view, light).and_then(|place| self.images.get(place));
-            let data = image.and_then(|image| Some((image, bytes.get(image.samples()?)?)));
-            let Some((image, data)) = data else {
-                let found = format!("no data of view {view}, light {light}");
-                return Err(Error::new(ErrorKind::Argument, found, "the file that was opened"));
-            };
-            image.number.append(&mut samples, data, self.unit);
-        }
-        Ok(samples)
+        self.opened.read(bytes, view, lights, |place, unit, samples| {
+            let image = self.images.get(place)?;
+            image.number.append(samples, bytes.get(image.samples()?)?, unit);
+            Some(())
+        })
     }
 }

@@ -8,7 +8,7 @@ use crate::behind::{Digits, Unit, names_another_unit, unit_behind};
 use crate::fields::{Field, Forms, NumberPrefix};
 use crate::file_name::picture_stem;
 use crate::words::counted;
-use crate::{Error, ErrorKind, Pair, Result};
+use crate::{Doubt, Error, ErrorKind, Pair, Result};
 
 /// Longest text of a pattern, bytes.
 const MAX_BYTES: usize = 1024;
@@ -91,6 +91,18 @@ impl Pattern {
 
     /// Directions that a name gives; `None` if it is no picture, does not fit, or gives impossible angles.
     pub fn angles(&self, name: &str) -> Option<Pair> {
+        let values = self.values(name)?;
+        self.forms.pair(|field| value_of(&values, field)).ok()
+    }
+
+    /// What is odd about the directions of a name that fits.
+    pub fn doubt(&self, name: &str) -> Option<Doubt> {
+        let values = self.values(name)?;
+        self.forms.doubt(|field| value_of(&values, field))
+    }
+
+    /// Values of the fields; `None` if the name is no picture or does not fit.
+    pub(super) fn values(&self, name: &str) -> Option<Vec<(Field, f64)>> {
         let stem = picture_stem(name)?;
         let mut left = if self.has_extension { name } else { stem };
         let mut values = Vec::new();
@@ -109,8 +121,7 @@ impl Pattern {
                 return None;
             }
         }
-        let value = |field| values.iter().find_map(|&(of, value)| (of == field).then_some(value));
-        self.forms.pair(value).ok()
+        Some(values)
     }
 
     /// Whether names give the view; else all images have the frontal one.
@@ -132,6 +143,10 @@ impl FromStr for Pattern {
     fn from_str(text: &str) -> Result<Pattern> {
         Pattern::parse(text)
     }
+}
+
+fn value_of(values: &[(Field, f64)], field: Field) -> Option<f64> {
+    values.iter().find_map(|&(of, value)| (of == field).then_some(value))
 }
 
 /// Tokens of one part of the path.
@@ -336,6 +351,28 @@ mod tests {
         ] {
             assert_eq!(angles(pattern, name), None, "{pattern} on {name}");
         }
+    }
+
+    #[test]
+    fn angles_that_cannot_be_meant_are_told_apart_from_names_that_do_not_fit() {
+        let doubt = |pattern: &str, name: &str| Pattern::parse(pattern).unwrap().doubt(name);
+        let impossible = |text: &str| Some(Doubt::Impossible(text.to_owned()));
+        let polar = "l{theta_i}_{phi_i}_v{theta_v}_{phi_v}";
+        for (pattern, name, expected) in [
+            (polar, "l15_30_v0_0.png", None),
+            (polar, "l15_-360_v0_360.png", None),
+            (polar, "l95_30_v0_0.png", impossible("theta 95 phi 30")),
+            (polar, "l15_30_v-5_0.png", impossible("theta -5 phi 0")),
+            (polar, "l15_400_v120_0.png", impossible("theta 120 phi 0")),
+            (polar, "l15_4000_v0_0.png", impossible("theta 15 phi 4000")),
+            (polar, "l15_400_v0_0.png", Some(Doubt::WholeTurns("phi 400".to_owned()))),
+            (polar, "l95_30.png", None),
+            (polar, "l95_30_v0_0.txt", None),
+            ("{theta_i:rad}_{phi_i:rad}", "1.7_0.png", impossible("theta 97.4028 phi 0")),
+        ] {
+            assert_eq!(doubt(pattern, name), expected, "{name}");
+        }
+        assert!(matches!(doubt("{x_i}_{y_i}_{z_i}", "1_0_-1.png"), Some(Doubt::Impossible(_))));
     }
 
     #[test]

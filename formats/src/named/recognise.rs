@@ -26,7 +26,8 @@ enum Labels {
 /// `thetaI=15 phiI=30`, `ti_15_pi_30_to_0_po_0`. Or a label for theta and phi together: `l15_30_v45_60`.
 /// Angles are in degrees, or in radians where `rad` stands behind each. The label may be in the file's name or, for one
 /// side, in that of its folder, or of one above that whose label is plain (`view_30_45`, `tv30_pv45`).
-/// Numbers without a label become `{n}`, the rest of the first name stays as it is.
+/// Numbers without a label become `{n}`, the rest of the first name stays as it is. Names that fit may have angles that
+/// no direction has: [`Pattern::doubt`] tells them.
 ///
 /// ```
 /// use btfkit_formats::named::recognise;
@@ -49,8 +50,12 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
         if let Some(unread) = unread_behind(first) {
             return unsupported(format!("the name {first:?} with {unread}"), KNOWN_FORMS);
         }
+        let what = match base(first).contains(|c: char| c.is_ascii_digit()) {
+            true => "whose numbers carry no labels of a whole direction, in one unit",
+            false => "which has no numbers",
+        };
         unsupported(
-            format!("the name {first:?}, whose numbers carry no labels of a whole direction, in one unit"),
+            format!("the name {first:?}, {what}"),
             "labels like `tl15_pl30_tv0_pv0` or `l15_30_v0_0`, degrees with decimal points, or a pattern that says what \
              is what",
         )
@@ -58,6 +63,9 @@ pub fn recognise<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Pattern
     let mut seen = HashMap::new();
     for &name in &pictures {
         let Some(pair) = pattern.angles(name) else {
+            if pattern.values(name).is_some() {
+                continue;
+            }
             if let Some(unread) = unread_behind(name) {
                 return Err(unsupported(format!("the name {name:?} with {unread}"), KNOWN_FORMS));
             }
@@ -84,7 +92,7 @@ impl Labels {
     fn pattern_of(self, name: &str) -> Option<Pattern> {
         let stem = picture_stem(name)?;
         let file = self.fields_of(base(stem))?;
-        let parse = |text: &str| Pattern::parse(text).ok().filter(|pattern| pattern.angles(name).is_some());
+        let parse = |text: &str| Pattern::parse(text).ok().filter(|pattern| pattern.values(name).is_some());
         if !units_agree(&file) {
             return None;
         }
@@ -324,7 +332,7 @@ mod tests {
             ("atl15_apl30.png", ""),
             ("tv15_pv30.png", ""),
             ("tl15_pl30_theta_i20.png", ""),
-            ("tl95_pl30.png", ""),
+            ("tl95_pl30.png", "tl{theta_i}_pl{phi_i}"),
             ("tl7,5_pl0.png", ""),
             ("tl7_5_pl0.png", ""),
             ("tl7-5_pl0.png", ""),
@@ -380,6 +388,12 @@ mod tests {
             ("tl4point5_pl0.png", ""),
             ("tl4 .5_pl0.png", ""),
             ("tl4_pt5_pl0.png", ""),
+            ("tl4_point_five_pl0.png", ""),
+            ("tl4 Point Five pl0.png", ""),
+            ("tl4_and_a_half_pl0.png", ""),
+            ("l15_30_v4_half_0.png", ""),
+            ("tl4_pl0_point_blank.png", "tl{theta_i}_pl{phi_i}_point_blank"),
+            ("tl4_pl0_two_sides.png", "tl{theta_i}_pl{phi_i}_two_sides"),
             ("tl4_pl0..5.png", ""),
             ("tl0.5pi_pl0pi.png", ""),
             ("tl4mil_pl0mil.png", ""),

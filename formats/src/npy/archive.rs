@@ -261,7 +261,7 @@ fn assumptions(linear: bool, assumed_view: bool) -> Vec<Assumption> {
         "Row 0 is taken to be the top.".into(),
     ];
     if assumed_view {
-        list.push("The one view is taken to be frontal.".into());
+        list.push(Assumption::views("The one view is taken to be frontal."));
     }
     list
 }

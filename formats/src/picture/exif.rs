@@ -24,6 +24,11 @@ pub(crate) fn colours(block: &[u8]) -> Option<String> {
     profile::of_exif_space(tiff::exif::colour_space(&as_tiff(block)).ok().flatten())
 }
 
+/// What else says something of samples, a sentence each: gamma, white point, primaries, transfer function.
+pub(crate) fn unapplied(block: &[u8]) -> Vec<String> {
+    tiff::exif::unapplied(&as_tiff(block))
+}
+
 /// The orientation in the data of a JPEG's segment for applications: Exif or XMP.
 pub(crate) fn orientation_of_segment(segment: &[u8]) -> u8 {
     match (segment.strip_prefix(MARK), segment.strip_prefix(orientation::XMP)) {

@@ -25,6 +25,7 @@ pub mod png;
 pub(crate) mod profile;
 mod size;
 mod tiff;
+pub(crate) mod unapplied;
 mod wavelength;
 pub(crate) mod xmp;
 

@@ -11,7 +11,7 @@ mod name;
 pub use crate::angles::Angles;
 pub use crate::catalogue::{Catalogue, CatalogueErrors, Duplicate, Pair};
 pub use crate::directions::directions_81;
-pub use name::{ImageName, expect_known, parse_name, write_name};
+pub use name::{ImageName, doubt, expect_known, parse_name, write_name};
 
 impl Catalogue {
     /// Sorts out a list of entry or file names by [`parse_name`]; see [`Catalogue::from_pairs`]. One pair

@@ -5,7 +5,7 @@ use crate::behind::{Digits, KNOWN_FORMS, Unit, unit_behind};
 use crate::fields::NumberPrefix;
 use crate::file_name::{base, picture_stem};
 use crate::words::counted;
-use crate::{Error, ErrorKind, Result};
+use crate::{Doubt, Error, ErrorKind, Result};
 
 /// The labels of the four angles.
 const KEYS: [[u8; 2]; 4] = [TL, PL, TV, PV];
@@ -52,6 +52,18 @@ pub fn parse_name(path: &str) -> Option<ImageName> {
         light: Angles::new(angle(stem, TL)?, angle(stem, PL)?)?,
         view: Angles::new(angle(stem, TV)?, angle(stem, PV)?)?,
     })
+}
+
+/// What is odd about the angles of a name that has all four labels: such a name is no image, or an image of another
+/// direction than it seems.
+pub fn doubt(path: &str) -> Option<Doubt> {
+    let stem = base(picture_stem(path)?);
+    let light = Doubt::of_angles(angle(stem, TL)?, angle(stem, PL)?);
+    let view = Doubt::of_angles(angle(stem, TV)?, angle(stem, PV)?);
+    match light {
+        Some(light) => Some(light.or_worse(view)),
+        None => view,
+    }
 }
 
 /// That no picture's name has the labels, but something behind an angle that is not known: `tl7,5`, `tl7p5`, `tl7_5`,

@@ -4,6 +4,7 @@ mod colors;
 mod grid;
 mod half_difference;
 mod numbers;
+mod opened;
 mod order;
 
 use crate::Assumption;
@@ -11,6 +12,7 @@ pub(crate) use colors::{Colors, transfer};
 pub(crate) use grid::{Grid, Pair};
 pub(crate) use half_difference::{below_the_surface, light_and_view};
 pub(crate) use numbers::{Number, with_capacity};
+pub(crate) use opened::Opened;
 pub use order::Order;
 
 /// What both readers have to assume, as neither format says it.

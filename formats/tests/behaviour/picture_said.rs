@@ -407,3 +407,69 @@ fn primaries_are_told_by_every_format_that_has_them() {
     let odd = hdr_of(&format!("{RGBE}PRIMARIES=sRGB\n"), "-Y 1 +X 8", &rgbe(8), 8, HdrCoding::Flat);
     assert!(said(&odd).profile.unwrap().contains("primaries"));
 }
+
+/// Exif data of one entry in the first directory, or in the one that it leads to: a tag of rationals in hundredths.
+fn exif_of_number(tag: u16, hundredths: &[u32], below: bool) -> Vec<u8> {
+    let count = (hundredths.len() as u32).to_be_bytes();
+    let numbers: Vec<u8> =
+        hundredths.iter().flat_map(|n| [n.to_be_bytes(), 100u32.to_be_bytes()].concat()).collect();
+    let entry = |at: u32| {
+        [&b"\0\x01"[..], &tag.to_be_bytes(), b"\0\x05", &count, &at.to_be_bytes(), &[0; 4]].concat()
+    };
+    let head = b"MM\0*\0\0\0\x08";
+    match below {
+        false => [&head[..], &entry(26), &numbers].concat(),
+        true => {
+            let first = b"\0\x01\x87\x69\0\x04\0\0\0\x01\0\0\0\x1A\0\0\0\0";
+            [&head[..], first, &entry(44), &numbers].concat()
+        }
+    }
+}
+
+#[test]
+fn metadata_that_change_what_samples_mean_are_told_by_every_format() {
+    let text = |key: &str, value: &str| png(&[png_chunk(b"tEXt", format!("{key}\0{value}").as_bytes())]);
+    let in_jpeg = |block: &[u8]| jpeg(&[segment(0xE1, &[b"Exif\0\0", block].concat())]);
+    let in_png = |block: &[u8]| png(&[png_chunk(b"eXIf", block)]);
+    let described = |description: &str| {
+        let mut text = description.as_bytes().to_vec();
+        text.resize(text.len().next_multiple_of(4), 0);
+        tiff(&[(270, words(&text))])
+    };
+    let gamma = exif_of_number(42240, &[220], true);
+    let white = exif_of_number(318, &[31, 32], false);
+    for (bytes, told) in [
+        (text("Gamma", "2.2"), "Gamma \"2.2\""),
+        (text("exif:Orientation", "6"), "exif:Orientation \"6\""),
+        (exr(&[("oiio:Gamma", "float", &2.4f32.to_le_bytes())]), "oiio:Gamma \"2.4\""),
+        (exr(&[("Orientation", "string", b"rotated 90 CW")]), "Orientation"),
+        (exr(&[("xmp", "string", b"<x/>")]), "xmp"),
+        (exr(&[("ICCProfile", "uint8[4]", &[0; 4])]), "ICCProfile"),
+        (exr(&[("expTime", "float", &0.5f32.to_le_bytes())]), "the exposure that expTime states"),
+        (in_jpeg(&gamma), "Gamma \"2.2\""),
+        (in_png(&gamma), "Gamma \"2.2\""),
+        (in_jpeg(&white), "WhitePoint \"0.31 0.32\""),
+        (in_png(&white), "WhitePoint"),
+        (tiff(&[(340, vec![16, 16, 16])]), "SMinSampleValue \"16 16 16\""),
+        (tiff(&[(341, vec![235, 235, 235])]), "SMaxSampleValue"),
+        (tiff(&[(50730, vec![1])]), "the exposure that BaselineExposure states"),
+        (described("ImageJ=1.53t\nimages=1\ncf=0\nc0=2\nc1=3\nvunit=OD\n"), "ImageJ:CalibrationFunction"),
+        (described("<?xml?><OME><Image><Pixels SignificantBits=\"6\"/></OME>"), "OME:SignificantBits \"6\""),
+    ] {
+        let remarks = said(&bytes).remarks;
+        let [found] = remarks.as_slice() else { panic!("{told}: {remarks:?}") };
+        assert!(found.contains(told) && found.contains("not applied"), "{found}, expected {told}");
+    }
+    assert!(said(&tiff(&[(318, vec![1, 1])])).profile.unwrap().contains("the white point"));
+    for bytes in [
+        text("Gamma", "1.0"),
+        text("Software", "GIMP"),
+        exr(&[("oiio:Gamma", "float", &1f32.to_le_bytes())]),
+        in_jpeg(&exif_of_number(42240, &[100], true)),
+        tiff(&[(340, vec![0, 0, 0]), (341, vec![255, 255, 255])]),
+        described("ImageJ=1.53t\nimages=1\nunit=mm\n"),
+        described("<OME><Image><Pixels SignificantBits=\"8\"/></OME>"),
+    ] {
+        assert_eq!(said(&bytes).remarks, [""; 0]);
+    }
+}

@@ -221,6 +221,24 @@ impl Table {
         }
     }
 
+    /// What to know of integers that have fewer bits than their type: the sensor's, perhaps.
+    pub(super) fn fewer_bits(&self) -> Option<String> {
+        let stored = self.dataset.dtype().ok()?;
+        let is_swapped = matches!(stored.byte_order(), hdf5::datatype::ByteOrder::BigEndian);
+        let all = match self.kind {
+            TypeDescriptor::Unsigned(IntSize::U1) => stored.is::<u8>(),
+            TypeDescriptor::Unsigned(IntSize::U2) => is_swapped || stored.is::<u16>(),
+            _ => true,
+        };
+        (!all).then(|| {
+            format!(
+                "the precision of {}, which is less than all bits of its type, is not applied: the largest number of \
+                 the type is taken for white",
+                self.name
+            )
+        })
+    }
+
     /// All elements of a dataset of 32-bit or 64-bit floats.
     pub(super) fn read_floats(&self) -> Result<Vec<f64>> {
         match self.kind {

@@ -91,7 +91,7 @@ impl Texels {
             lights: read_directions(file, DIRECTIONS[1], lights, limits)?,
             linear: either("transfer", TRANSFER)?,
             cosine_included: either("radiometry", RADIOMETRY)?,
-            assumptions: Vec::new(),
+            assumptions: reflectance.fewer_bits().into_iter().map(Into::into).collect(),
             remarks,
         };
         Ok((Self { reflectance }, contents))

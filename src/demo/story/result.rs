@@ -219,7 +219,7 @@ pub(super) fn commands(settings: &Settings) -> Section {
         format!("btf cluster {measurement} {model} --clusters {clusters} --centre median {limits} {seed}"),
         format!("btf normals {measurement} {model}"),
         format!("btf fit {model} --mrf 3d"),
-        format!("btf compare {model} {measurement} --picture compare.png"),
+        format!("btf compare {measurement} {model} --picture compare.png"),
         format!("btf appearance {model}"),
         format!("btf enlarge {model} {enlarged} --size {size} {seed}"),
         format!("btf enlarge {model} {by_paper} --size {size} {seed} {paper}"),

@@ -38,7 +38,8 @@ impl Tiles {
         let size = exemplar.size;
         if !exemplar.wraps {
             return Err(Error::usage("the borders of this tile do not join, so no tiles of its border do")
-                .hint("choose another --method, or make a model whose tile joins: btf model --tile cut, of a measurement large enough"));
+                .hint("choose another --method, or make a model whose tile joins, of a measurement large enough: btf model \
+                     MEASUREMENT NEW.model.zarr --tile cut"));
         }
         if !(1..=MOST_TILES).contains(&count) {
             return Err(Error::usage(format!("got {count} tiles, expected 1 to {MOST_TILES}")));

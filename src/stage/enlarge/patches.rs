@@ -66,7 +66,7 @@ pub(super) fn exemplar(subject: &Subject, tile: &Tile) -> Result<Exemplar> {
 impl Patches {
     pub(super) fn open(subject: &Subject, options: &Options) -> Result<Self> {
         if options.pieces == Pieces::Repeat && subject.options.seeds.start() != subject.options.seeds.end() {
-            return Err(Error::usage("--method repeat is the same for all seeds").hint("give one --seed"));
+            return Err(Error::usage("--method repeat is the same for all seeds").hint("leave out --seed"));
         }
         let kept = Kept { source: options.keep_source, normals: options.keep_normals };
         let tile = Tile::open(subject, kept)?;

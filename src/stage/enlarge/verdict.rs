@@ -23,6 +23,12 @@ const MOST_COPY: f64 = 0.25;
 /// Share of the measured plane from which on a larger tile gains little.
 const NEARLY_ALL: f64 = 0.6;
 
+/// Share of the tile that may be black from everywhere: a mask or a border, and no material.
+const MOST_BLACK: f64 = 0.25;
+
+/// L* codes up to this one are black, of 255.
+const BLACK_CODE: u8 = 3;
+
 /// What the cheap measures say of an enlargement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Verdict {
@@ -31,6 +37,8 @@ pub struct Verdict {
     pub counted: Counted,
     /// By how much the largest autocorrelation at shifts of 12 texels or more exceeds the tile's.
     pub excess_peak: f64,
+    /// Share of the tile whose texels are black from all views and under all lights.
+    pub black: f64,
     /// What makes the enlargement look unlike its tile, and what to do about it.
     pub warnings: Vec<String>,
 }
@@ -59,6 +67,7 @@ impl Subject {
             let code = |&cluster: &u16| lightness.get(usize::from(cluster)).copied().unwrap_or_default();
             Lightness::of_codes(size, index.iter().map(code))
         };
+        let black = self.black(&tile)?;
         let tile = picture(self.tile, &tile).part(part);
         let excess_peak = excess_peak(&picture(window.size, &index), &tile);
         let report = self.model.tile_report()?;
@@ -67,11 +76,23 @@ impl Subject {
         let more = if of_tile as f64 > NEARLY_ALL * of_plane as f64 {
             "measure a larger part of the material"
         } else {
-            "take a larger tile (btf tile --tile WIDTHxHEIGHT, or none for the whole plane)"
+            "make the model of a larger tile (btf model MEASUREMENT MODEL --force with --tile WIDTHxHEIGHT, or none for the \
+             whole plane)"
         };
-        let mut verdict = Verdict { counted: tally.verdict(), excess_peak, warnings: Vec::new() };
-        verdict.warnings = verdict.warnings(method, more);
+        let mut verdict = Verdict { counted: tally.verdict(), excess_peak, black, warnings: Vec::new() };
+        verdict.warnings = verdict.warnings(method, more, &self.model.path().display().to_string());
         Ok(Some(verdict))
+    }
+
+    /// Share of the texels of a tile whose clusters are black from everywhere.
+    fn black(&self, tile: &[u16]) -> Result<f64> {
+        let [views, lights] = self.model.directions()?;
+        let brdf = (views.len() * lights.len()).max(1);
+        let centres = self.model.centres()?;
+        let is_black: Vec<bool> =
+            centres.chunks(brdf).map(|codes| codes.iter().all(|&code| code <= BLACK_CODE)).collect();
+        let black = tile.iter().filter(|&&cluster| is_black.get(usize::from(cluster)) == Some(&true)).count();
+        Ok(black as f64 / tile.len().max(1) as f64)
     }
 
     /// L* code of each cluster, from the most frontal view under its lowest light, which shows relief.
@@ -85,8 +106,8 @@ impl Subject {
 }
 
 impl Verdict {
-    /// What is wrong, each with what to do; `more` is how to come by a larger tile.
-    fn warnings(&self, method: Method, more: &str) -> Vec<String> {
+    /// What is wrong, each with what to do; `more` is how to come by a larger tile, `model` where the model lies.
+    fn warnings(&self, method: Method, more: &str, model: &str) -> Vec<String> {
         let coherent = method == Method::Coherent;
         let advise = |advice: String| if coherent { advice } else { "take --method coherent".to_owned() };
         let mut warnings = Vec::new();
@@ -98,11 +119,20 @@ impl Verdict {
             ));
         }
         if self.excess_peak < -MOST_EXCESS {
-            let advice = "if the material is regular, name its lattice (btf appearance --lattice)";
+            let advice = format!(
+                "if the material is regular, name its lattice (btf appearance {model} --force --lattice 'dy,dx;dy,dx')"
+            );
             warnings.push(format!(
                 "the tile is more regular by {:.2}: {}",
                 -self.excess_peak,
-                advise(advice.to_owned())
+                advise(advice)
+            ));
+        }
+        if self.black > MOST_BLACK {
+            warnings.push(format!(
+                "{:.0} % of the tile are black from everywhere, and as much of the enlargement: crop the pictures to the \
+                 material and import them again",
+                100.0 * self.black
             ));
         }
         let copies = self.counted.largest_copy.is_some_and(|copy| copy > MOST_COPY);
@@ -123,7 +153,8 @@ mod tests {
     fn each_fault_has_its_warning_and_none_is_none() {
         let of = |shares, excess_peak, largest_copy, method| {
             let counted = Counted { shares, largest_copy };
-            Verdict { counted, excess_peak, warnings: Vec::new() }.warnings(method, "more")
+            Verdict { counted, excess_peak, black: 0.0, warnings: Vec::new() }
+                .warnings(method, "more", "m.zarr")
         };
         let coherent = |shares, peak, copy| of(shares, peak, copy, Method::Coherent);
         assert!(coherent(0.95, 0.0, Some(0.02)).is_empty());

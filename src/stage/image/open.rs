@@ -17,6 +17,7 @@ use crate::store::enlarged::{self, Enlarged};
 use crate::store::kind_of;
 use crate::store::measurement::{self, Measurement};
 use crate::store::model::{self, Model, Stage};
+use crate::store::recognise::article;
 
 /// What is pictured, as it was opened.
 struct Opened {
@@ -36,8 +37,9 @@ impl Scene {
         let kind = kind_of(path)?;
         if options.plane.is_some() && kind != model::KIND {
             return Err(Error::usage(format!(
-                "{}: an endless plane is made of a model, got a {kind}",
-                path.display()
+                "{}: an endless plane is made of a model, got {}",
+                path.display(),
+                article(kind)
             )));
         }
         type Of = fn(Stored) -> SceneRecipe;
@@ -171,14 +173,14 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         }
         Subject::Normals => {
             return Err(Error::missing(format!("{} has no normals", options.source.display()))
-                .hint("enlarge with --keep-normals to have them"));
+                .hint("enlarge with --keep-normals to have them, under another name or with --force"));
         }
         Subject::Appearance { .. } => {
             return Err(Error::missing(format!(
                 "{} does not say which texel of the tile each of its texels is",
                 options.source.display()
             ))
-            .hint("enlarge by another --method than paper, without --no-source"));
+            .hint("enlarge by another --method than paper, without --no-source, under another name or with --force"));
         }
     };
     Ok(Opened { source, size, directions })

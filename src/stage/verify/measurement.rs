@@ -29,6 +29,8 @@ pub struct Report {
     pub samples: Remarkable,
     /// Samples that differ from the archive's, where it was compared.
     pub different: Option<u64>,
+    /// How many images have such samples.
+    pub images_different: usize,
     /// Images with such samples, (view, light): the first of them.
     pub different_images: Vec<(usize, usize)>,
     /// What else is wrong, or has to be done.
@@ -107,6 +109,7 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
         report.samples += remarkable;
         report.different_images.extend(images);
     }
+    report.images_different = report.different_images.len();
     report.different_images.truncate(NAMED_IMAGES);
     Ok(report)
 }
@@ -153,7 +156,7 @@ fn expect_same_shape(measurement: &Measurement, source: &dyn Source) -> Result<(
         source.path().display(),
         measurement.path().display()
     ))
-    .hint("give the options that the import was given"))
+    .hint("leave out the options that ask for another reading than that of the import: it is taken from the store"))
 }
 
 /// Decodes a view, chunk by chunk where it cannot be decoded whole, and works out its L* codes again.

@@ -3,9 +3,9 @@
 use exr::compression::Compression;
 
 use super::channels::{Channels, text};
-use crate::picture::aspect;
 use crate::picture::profile::{of_chromaticities, of_space_name};
 use crate::picture::size::{Size, unsupported};
+use crate::picture::{aspect, unapplied};
 use crate::reader::Reader;
 use crate::words::counted;
 use crate::{Error, Limits, Result};
@@ -54,6 +54,8 @@ struct Attributes<'a> {
     orientation: Option<&'a [u8]>,
     space: Option<&'a [u8]>,
     interop: Option<&'a [u8]>,
+    /// Of other attributes, a sentence each.
+    others: Vec<String>,
 }
 
 impl<'a> Attributes<'a> {
@@ -89,7 +91,10 @@ impl<'a> Attributes<'a> {
                 "Orientation" if kind == "int" => (&mut attributes.orientation, "int"),
                 "oiio:ColorSpace" if kind == "string" => (&mut attributes.space, "string"),
                 "colorInteropID" if kind == "string" => (&mut attributes.interop, "string"),
-                _ => continue,
+                other => {
+                    attributes.others.extend(unapplied::remark(other, &value_of(&kind, data)));
+                    continue;
+                }
             };
             if kind != wanted || slot.is_some() {
                 let found = format!("the attribute {name:?} of type {kind:?}, or a second one");
@@ -110,7 +115,7 @@ impl Attributes<'_> {
                 "a white of {white} cd/m2 (whiteLuminance) is not applied: samples are taken as reflectance"
             )
         });
-        aspect.into_iter().chain(white).collect()
+        aspect.into_iter().chain(white).chain(self.others.iter().cloned()).collect()
     }
 }
 
@@ -208,6 +213,16 @@ impl Header {
     pub(super) fn chunk_count(&self) -> u64 {
         let (across, down) = self.chunk_grid();
         u64::from(across).saturating_mul(u64::from(down))
+    }
+}
+
+/// A value for people: a text, or a number; nothing of other types.
+fn value_of(kind: &str, data: &[u8]) -> String {
+    match (kind, data) {
+        ("string", text) => String::from_utf8_lossy(text).into_owned(),
+        ("float", &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]).to_string(),
+        ("int", &[a, b, c, d]) => i32::from_le_bytes([a, b, c, d]).to_string(),
+        _ => String::new(),
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 
 use super::SIGNATURE;
-use crate::picture::{aspect, exif, orientation, profile};
+use crate::picture::{aspect, exif, orientation, profile, unapplied};
 use crate::reader::Reader;
 
 /// Longest profile or text that is inflated, bytes.
@@ -30,6 +30,8 @@ pub(super) struct Said {
     xmp_colours: Option<String>,
     calibration: Option<String>,
     aspect: Option<String>,
+    /// Of texts and Exif data, a sentence each.
+    others: Vec<String>,
 }
 
 impl Said {
@@ -61,9 +63,9 @@ impl Said {
         (!said.is_empty()).then(|| said.join(", with "))
     }
 
-    /// What is said of pixels that are not square.
+    /// What is said of pixels that are not square, and of samples by other names.
     pub(super) fn remarks(&self) -> Vec<String> {
-        self.aspect.iter().cloned().collect()
+        self.aspect.iter().chain(&self.others).cloned().collect()
     }
 
     fn hear(&mut self, name: &[u8; 4], data: &[u8]) {
@@ -124,6 +126,7 @@ impl Said {
     fn hear_exif(&mut self, block: &[u8]) {
         self.turn(exif::orientation(block));
         self.exif_colours = self.exif_colours.take().or_else(|| exif::colours(block));
+        self.others.extend(exif::unapplied(block));
     }
 
     fn hear_xmp(&mut self, packet: &[u8]) {
@@ -144,7 +147,9 @@ impl Said {
         };
         let (raw, xmp) = (key.strip_prefix(b"Raw profile type "), key == b"XML:com.adobe.xmp");
         let space = [&b"oiio:ColorSpace"[..], b"colorInteropID"].contains(&key);
-        if raw.is_none() && !xmp && !space {
+        let name_of_it = String::from_utf8_lossy(key);
+        let other = !xmp && unapplied::remark(&name_of_it, "").is_some();
+        if raw.is_none() && !xmp && !space && !other {
             return;
         }
         let text = match (name, rest) {
@@ -156,6 +161,10 @@ impl Said {
             }
             _ => return,
         };
+        if other {
+            self.others.extend(unapplied::remark(&name_of_it, &String::from_utf8_lossy(&text)));
+            return;
+        }
         if space {
             let told = profile::of_space_name(&String::from_utf8_lossy(&text), false);
             self.space = self.space.take().or(told);

@@ -26,8 +26,13 @@ fn of_tags(directory: &Directory<'_>) -> Option<String> {
             return Some(what.to_owned());
         }
     }
-    let primaries = directory.reals(tag::PRIMARIES)?;
-    of_chromaticities(&[primaries, directory.reals(tag::WHITE_POINT).unwrap_or_default()].concat())
+    let white = directory.reals(tag::WHITE_POINT);
+    let Some(primaries) = directory.reals(tag::PRIMARIES) else {
+        // The white of sRGB is D65.
+        let is_srgb = |white: &Vec<f64>| matches!(white[..], [x, y] if (x - 0.3127).abs() < 2e-3 && (y - 0.329).abs() < 2e-3);
+        return white.filter(|white| !is_srgb(white)).map(|white| format!("the white point {white:?}"));
+    };
+    of_chromaticities(&[primaries, white.unwrap_or_default()].concat())
 }
 
 /// What samples stand for black and white, where these are not the ends of the range.

@@ -44,6 +44,8 @@ pub(super) mod tag {
     pub(crate) const SUB_IFDS: u16 = 330;
     pub(crate) const EXTRA_SAMPLES: u16 = 338;
     pub(crate) const SAMPLE_FORMAT: u16 = 339;
+    pub(crate) const SMIN_SAMPLE_VALUE: u16 = 340;
+    pub(crate) const SMAX_SAMPLE_VALUE: u16 = 341;
     pub(crate) const REFERENCE_BLACK_WHITE: u16 = 532;
     pub(crate) const XMP: u16 = 700;
     pub(crate) const IMAGE_DEPTH: u16 = 32997;
@@ -54,9 +56,11 @@ pub(super) mod tag {
     pub(crate) const COLOUR_SPACE: u16 = 40961;
     pub(crate) const GDAL_METADATA: u16 = 42112;
     pub(crate) const GDAL_NODATA: u16 = 42113;
+    pub(crate) const EXIF_GAMMA: u16 = 42240;
     pub(crate) const LINEARIZATION_TABLE: u16 = 50712;
     pub(crate) const BLACK_LEVEL: u16 = 50714;
     pub(crate) const WHITE_LEVEL: u16 = 50717;
+    pub(crate) const BASELINE_EXPOSURE: u16 = 50730;
     pub(crate) const DEFAULT_CROP_ORIGIN: u16 = 50719;
     pub(crate) const DEFAULT_CROP_SIZE: u16 = 50720;
     pub(crate) const ACTIVE_AREA: u16 = 50829;

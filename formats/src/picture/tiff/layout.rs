@@ -154,7 +154,7 @@ impl Layout {
             predictor,
             orientation,
             profile: colours::said(directory, exif::colour_space(bytes).ok().flatten(), most),
-            remarks: remarks::of(directory, dimensions),
+            remarks: remarks::of(directory, dimensions, most),
             rgb,
             chunks,
             places,

@@ -1,14 +1,16 @@
 //! What a TIFF says of its pixels that is not applied: a crop (DNG), samples that are none and scales (GDAL), pixels that
-//! are not square.
+//! are not square, the range and the calibration of samples (ImageJ, OME).
 
 use super::directory::{Directory, tag};
-use crate::picture::aspect;
+use super::exif;
+use crate::picture::{aspect, unapplied};
 
 /// Longest text of a tag that is told, bytes.
 const LONGEST: usize = 60;
 
 /// A sentence each, of a picture of `size` columns and rows.
-pub(super) fn of(directory: &Directory<'_>, (width, height): (u64, u64)) -> Vec<String> {
+/// `most` is the largest sample of an integer type.
+pub(super) fn of(directory: &Directory<'_>, (width, height): (u64, u64), most: Option<f64>) -> Vec<String> {
     let whole = |list: &[f64], expected: &[f64]| list == expected;
     let (width, height) = (width as f64, height as f64);
     let crops = [
@@ -29,7 +31,45 @@ pub(super) fn of(directory: &Directory<'_>, (width, height): (u64, u64)) -> Vec<
             "samples of {value:?} are no data by GDAL_NODATA, which is not applied: they are read as they are"
         )
     });
-    crops.chain(no_data).chain(scaled(directory)).chain(not_square(directory)).collect()
+    crops
+        .chain(no_data)
+        .chain(scaled(directory))
+        .chain(not_square(directory))
+        .chain(range(directory, most))
+        .chain(exif::of_tags(directory, &[(tag::BASELINE_EXPOSURE, "BaselineExposure")]))
+        .chain(exif::gamma(directory))
+        .chain(described(directory, most))
+        .collect()
+}
+
+/// The range of samples (SMinSampleValue, SMaxSampleValue), where it is not that of their type: 0 to 1 for floats.
+fn range(directory: &Directory<'_>, most: Option<f64>) -> Vec<String> {
+    let ends = [
+        (tag::SMIN_SAMPLE_VALUE, "SMinSampleValue", 0.0),
+        (tag::SMAX_SAMPLE_VALUE, "SMaxSampleValue", most.unwrap_or(1.0)),
+    ];
+    let told = ends.into_iter().filter_map(|(tag, name, ordinary)| {
+        directory.bytes_of(tag)?;
+        let values = directory.reals(tag).unwrap_or_default();
+        let is_ordinary = !values.is_empty() && values.iter().all(|value| *value == ordinary);
+        if is_ordinary { None } else { unapplied::remark_of(name, &values) }
+    });
+    told.collect()
+}
+
+/// What the description says of samples: the calibration of ImageJ (`cf`, its function, and its coefficients), the bits
+/// that OME says are used.
+fn described(directory: &Directory<'_>, most: Option<f64>) -> Option<String> {
+    let text = String::from_utf8_lossy(directory.bytes_of(tag::IMAGE_DESCRIPTION)?);
+    if text.starts_with("ImageJ=") {
+        let function = text.lines().find_map(|line| line.strip_prefix("cf="))?;
+        return unapplied::remark("ImageJ:CalibrationFunction", function);
+    }
+    let (_, value) = text.split_once("SignificantBits=")?;
+    let bits = value.trim_start_matches(['"', '\'']).split(['"', '\'']).next()?;
+    let is_all =
+        bits.parse::<u32>().is_ok_and(|bits| most.map(|most| (most + 1.0).log2()) == Some(f64::from(bits)));
+    if is_all { None } else { unapplied::remark("OME:SignificantBits", bits) }
 }
 
 /// A scale other than 1 or an offset other than 0 in GDAL's metadata, `<Item name="SCALE" role="scale">0.1</Item>`.

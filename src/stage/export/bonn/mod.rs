@@ -229,6 +229,9 @@ fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Conte
     };
     let (mut number, of) = (before, parts * options.passes());
     let factors = factor::truncated(size, rank, &options, |visit| {
+        if number > before {
+            context.progress.end();
+        }
         number += 1;
         context.progress.stage(Some(Stage { number, of, name: "factorise" }));
         for_each_view(measurement, context, |view, images| {
@@ -236,8 +239,12 @@ fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Conte
             let values: Vec<f32> =
                 rows_of_view(measurement, part, &images).flatten().map(|v| v as f32).collect();
             visit(Block { rows: view * rows..(view + 1) * rows, columns: 0..size.columns, values: &values })
-        })
+        })?;
+        // What follows a pass takes long with many columns, and counts nothing.
+        context.progress.begin("decompose", 1, Counted::Items("matrices"));
+        Ok(())
     })?;
+    context.progress.end();
     context.progress.stage(None);
     Ok(factors)
 }

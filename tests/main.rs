@@ -86,6 +86,8 @@ mod safety;
 mod setup;
 #[path = "behaviour/shares.rs"]
 mod shares;
+#[path = "behaviour/slurm.rs"]
+mod slurm;
 #[path = "behaviour/tiles.rs"]
 mod tiles;
 #[path = "behaviour/verify.rs"]

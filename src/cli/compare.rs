@@ -4,6 +4,8 @@ use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
+use btfkit::run::partial::Sharing;
+use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
 use btfkit::stage::{compare, image};
 use btfkit::store;
@@ -19,8 +21,11 @@ use super::{Console, as_json};
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
-Example:
-  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0")]
+Examples:
+  btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0
+Share the work between processes; the figures are those of one:
+  btf compare wood.zarr wood.model.zarr --partial sums --shard 0/8     ... 7/8, in any order
+  btf compare wood.zarr wood.model.zarr --partial sums --reduce        exit code 66 if a part is missing")]
 pub(super) struct Compare {
     /// The measurement
     measurement: PathBuf,
@@ -36,12 +41,26 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
+    /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
+    #[arg(long, value_name = "DIR")]
+    partial: Option<PathBuf>,
+    /// Compare only part K of N of the views, K from 0, in any order; `env` takes both from the variables of Slurm or MPI
+    #[arg(long, requires = "partial", value_name = "K/N|env", default_value = "0/1")]
+    shard: Shard,
+    /// Compare nothing, only put the sums in the folder together
+    #[arg(long, requires = "partial", conflicts_with = "shard")]
+    reduce: bool,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl Compare {
+    /// Whether the same command goes on where it was stopped.
+    pub(super) fn goes_on(&self) -> bool {
+        self.partial.is_some()
+    }
+
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         // Both are read, so what they are tells which is which.
@@ -50,7 +69,20 @@ impl Compare {
         let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
         let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
-        let report = compare::run(&model, &measurement, context)?;
+        let report = match &self.partial {
+            None => compare::run(&model, &measurement, context)?,
+            Some(folder) => {
+                let shard = (!self.reduce).then_some(self.shard);
+                let sharing = Sharing { folder: folder.clone(), shard };
+                let shared = compare::run_shared(&model, &measurement, &sharing, context)?;
+                let Some(report) = shared.report else {
+                    let views = counted(shared.views, "view");
+                    console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
+                    return Ok(());
+                };
+                report
+            }
+        };
         if self.json {
             let value = as_json(&report)?;
             console.plan(&value)?;

@@ -3,6 +3,7 @@ use std::path::Path;
 use btfkit::error::Result;
 use btfkit::picture::deepzoom::Encoding;
 use btfkit::run::Context;
+use btfkit::run::shard::Shard;
 use btfkit::stage::deepzoom;
 use btfkit::stage::image::Subject;
 use btfkit::words::counted;
@@ -33,6 +34,10 @@ pub(super) struct Deepzoom {
     /// Pixels by which neighbouring tiles overlap
     #[arg(long, default_value_t = 1, value_name = "PIXELS")]
     overlap: usize,
+    /// Encode only the tiles of part K of N of the rows, K from 0, so that N jobs share the work, in any order; `env`
+    /// takes both from the variables of Slurm or MPI
+    #[arg(long, value_name = "K/N|env", default_value = "0/1")]
+    shard: Shard,
     /// Print what would be done, and do nothing
     #[arg(long)]
     dry_run: bool,
@@ -84,6 +89,7 @@ impl Deepzoom {
                 },
                 tile_side: self.tile_size,
                 overlap: self.overlap,
+                shard: self.shard,
             },
             context,
         )?;
@@ -103,7 +109,11 @@ impl Deepzoom {
             counted(report.tiles_written, "tile"),
             report.tiles_found
         ));
-        console.line(format!("{}: a viewer of it", output.with_extension("html").display()));
+        if report.complete {
+            console.line(format!("{}: a viewer of it", output.with_extension("html").display()));
+        } else {
+            console.line("tiles of other parts are missing; the viewer comes with the last of them");
+        }
         console.notes(&report.notes);
         Ok(())
     }

@@ -89,7 +89,7 @@ pub(super) struct Enlarge {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Method {
+pub(super) enum Method {
     /// Continues pieces of the tile so that they fit; keeps structure
     Coherent,
     /// The method of Filip and Haindl 2007: normals from a random field, and the clusters with the nearest normals

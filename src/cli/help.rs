@@ -25,7 +25,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
     ("Enlarge", &["enlarge", "judge"]),
     ("Look", &["image"]),
-    ("Share work", &["status", "missing"]),
+    ("Share work", &["slurm", "status", "missing"]),
     ("Set up", &["completions", "man", "help"]),
 ];
 

@@ -25,6 +25,7 @@ mod outputs;
 mod progress;
 mod sample;
 mod scene;
+mod slurm;
 mod source;
 mod status;
 mod table;
@@ -136,6 +137,7 @@ enum Command {
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
+    Slurm(slurm::Slurm),
     Completions(help::Completions),
     Man(help::Manual),
 }
@@ -282,6 +284,7 @@ impl Command {
         match self {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
+            Self::Compare(command) => command.goes_on(),
             _ => false,
         }
     }
@@ -294,6 +297,7 @@ impl Command {
             Self::Verify(command) => return command.run(given, context, console),
             Self::Status(command) => return command.run(context, console),
             Self::Missing(command) => command.run(console),
+            Self::Slurm(command) => command.run(context, console),
             Self::Model(command) => return command.run(context, console),
             Self::Enlarge(command) => return command.run(given, context, console),
             Self::Demo(command) => command.run(context, console),

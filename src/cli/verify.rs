@@ -2,6 +2,7 @@ use std::path::{Path, PathBuf};
 
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
+use btfkit::run::shard::Shard;
 use btfkit::stage::verify::{self, Beside, Finding, Found, measurement};
 use btfkit::store::measurement::Measurement;
 use btfkit::text::escaped;
@@ -26,6 +27,7 @@ Examples:
   btf verify wood-4k.zarr                           with its model, which lies beside it or is named by --model
   btf verify wood-4k.dzi                            a Deep Zoom pyramid
   btf verify stores/*.zarr                          one line each, and a count
+  btf verify wall.zarr --shard 3/8                  the fourth of eight jobs that share the work; all must end with 0
 The exit code is 65 if something is damaged or different, and 66 if something is missing.")]
 pub(super) struct Verify {
     /// Measurements, models, enlargements and Deep Zoom pyramids (the .dzi or the folder of tiles); if there are
@@ -39,6 +41,10 @@ pub(super) struct Verify {
     /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
+    /// Look only at part K of N of the views of a measurement, or of the rows of shards of an enlargement, K from 0, so
+    /// that N jobs share the work; `env` takes both from the variables of Slurm or MPI
+    #[arg(long, value_name = "K/N|env", default_value = "0/1")]
+    shard: Shard,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -83,7 +89,8 @@ impl Verify {
                 .unwrap_or_default();
             Some(self.source.open_as_in(reading, &self.archive)?)
         };
-        verify::run(path, &Beside { source: source.as_deref(), model: self.model.clone() }, context)
+        let model = self.model.clone();
+        verify::run(path, &Beside { source: source.as_deref(), model, shard: self.shard }, context)
     }
 }
 

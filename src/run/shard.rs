@@ -11,6 +11,12 @@ pub struct Shard {
     pub parts: usize,
 }
 
+impl Default for Shard {
+    fn default() -> Self {
+        Self::WHOLE
+    }
+}
+
 impl Shard {
     /// All units.
     pub const WHOLE: Self = Self { part: 0, parts: 1 };
@@ -18,6 +24,14 @@ impl Shard {
     /// Whether a unit belongs to this part.
     pub fn has(self, unit: usize) -> bool {
         unit % self.parts == self.part
+    }
+
+    /// What of a whole was looked at, for people.
+    pub(crate) fn looked_at(self, count: usize, of: &str) -> String {
+        format!(
+            "part {} of {}: {count} of {of} looked at, and what all have in common",
+            self.part, self.parts
+        )
     }
 
     /// The part that a scheduler gave to this process, by the variables that `variable` looks up.

@@ -2,16 +2,21 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::color::{ciede2000, lab};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::run::partial::{Partial, Sharing};
 use crate::run::progress::Counted;
+use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
+use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::image::of_stage;
 use crate::store::measurement::Measurement;
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Representatives, Stage};
+use crate::words::counted;
 
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
@@ -97,7 +102,7 @@ pub enum Agreement {
     Undefined,
 }
 
-#[derive(Clone, Default)]
+#[derive(Clone, Default, Serialize, Deserialize)]
 struct Sums {
     views: usize,
     codes: u64,
@@ -177,70 +182,164 @@ pub fn open(options: &Options) -> Result<(Model, Measurement)> {
     Ok((model, measurement))
 }
 
+/// What was compared by a run that shares the work.
+#[derive(Clone, Debug, Serialize)]
+pub struct Shared {
+    /// Views of all parts that are compared by now.
+    pub done: usize,
+    /// Views that there are.
+    pub views: usize,
+    /// Where their results lie.
+    pub folder: PathBuf,
+    /// The errors, once all views are compared.
+    pub report: Option<Report>,
+}
+
 /// Re-makes the tile under every pair of directions and compares it with the measurement.
 ///
 /// # Errors
 /// Those of reading, and too little memory.
 pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> Result<Report> {
-    let description = measurement.description();
-    let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
-    let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
-    let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
-    let (texel, channels) = (description.texel_samples(), description.n_channels());
-    let decoder = description.decoder()?;
-    let codes = description.codes()?;
-    let stride = offsets.len().div_ceil(COLOUR_TEXELS);
+    let views: Vec<usize> = (0..measurement.description().views.len()).collect();
+    let comparison = Comparison::open(model, measurement)?;
+    let sums = comparison.sums(&views, context, |_, _| Ok(()))?;
+    Ok(comparison.report(&sums))
+}
 
-    let views: Vec<usize> = (0..description.views.len()).collect();
-    context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
-    let window_bytes = 2 * (bounds.size.texels() * description.texel_bytes()) as u64;
-    let in_flight = units::in_flight(context, &format!("comparing views of {}", bounds.size), window_bytes)?;
-    let sums = units::for_each(context, &views, in_flight, |&view| {
-        let window = measurement.read_reflectance(view, bounds)?;
+/// As [`run`], shared between runs: each view's sums are kept in a folder, and whoever finds all of them adds them up, in
+/// the order of the views.
+///
+/// # Errors
+/// As [`run`]; and [`crate::ErrorKind::Missing`] where nothing is to be compared but something is missing.
+pub fn run_shared(
+    model: &Model,
+    measurement: &Measurement,
+    sharing: &Sharing,
+    context: &Context<'_>,
+) -> Result<Shared> {
+    let n_views = measurement.description().views.len();
+    let what = json!({
+        "stage": "compare", "method": METHOD, "measurement": measurement.digest(),
+        "model": model.digest_of(&[Stage::Tile, Stage::Cluster])?,
+    });
+    let partial = Partial::at(&sharing.folder, &what)?;
+    let kept = || (0..n_views).map(|view| partial.read::<Sums>(view)).collect::<Vec<_>>();
+    let comparison = Comparison::open(model, measurement)?;
+    if let Some(shard) = sharing.shard {
+        let found = kept();
+        let missing: Vec<usize> =
+            (0..n_views).filter(|&view| shard.has(view) && found[view].is_none()).collect();
+        comparison.sums(&missing, context, |view, sums| partial.write(view, sums))?;
+    }
+    let sums = kept();
+    let done = sums.iter().flatten().count();
+    let folder = partial.folder().to_owned();
+    if done < n_views && sharing.shard.is_none() {
+        return Err(Error::missing(format!(
+            "{}: {done} of {} compared",
+            folder.display(),
+            counted(n_views, "view")
+        ))
+        .hint("run all parts first: the same command with --shard K/N instead of --reduce"));
+    }
+    let all: Option<Vec<Sums>> = sums.into_iter().collect();
+    Ok(Shared { done, views: n_views, folder, report: all.map(|sums| comparison.report(&sums)) })
+}
+
+/// A model and a measurement, with what all views have in common.
+struct Comparison<'a> {
+    measurement: &'a Measurement,
+    bounds: Window,
+    /// Texels of the tile, within the bounds.
+    offsets: Vec<usize>,
+    index: Vec<u16>,
+    representatives: Representatives,
+    /// Of so many texels one's colours are compared.
+    stride: usize,
+}
+
+impl<'a> Comparison<'a> {
+    fn open(model: &Model, measurement: &'a Measurement) -> Result<Self> {
+        let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
+        let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
+        let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
+        let stride = offsets.len().div_ceil(COLOUR_TEXELS);
+        Ok(Self { measurement, bounds, offsets, index, representatives, stride })
+    }
+
+    /// Compares these views; each one's sums are handed to `keep`.
+    fn sums(
+        &self,
+        views: &[usize],
+        context: &Context<'_>,
+        keep: impl Fn(usize, &Sums) -> Result<()> + Sync,
+    ) -> Result<Vec<Sums>> {
+        let texel_bytes = self.measurement.description().texel_bytes();
+        context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
+        let window_bytes = 2 * (self.bounds.size.texels() * texel_bytes) as u64;
+        let what = format!("comparing views of {}", self.bounds.size);
+        let in_flight = units::in_flight(context, &what, window_bytes)?;
+        let sums = units::for_each(context, views, in_flight, |&view| {
+            let sums = self.of_view(view)?;
+            keep(view, &sums)?;
+            context.progress.advance(1);
+            Ok(sums)
+        })?;
+        context.progress.end();
+        Ok(sums)
+    }
+
+    fn of_view(&self, view: usize) -> Result<Sums> {
+        let description = self.measurement.description();
+        let (texel, channels) = (description.texel_samples(), description.n_channels());
+        let (decoder, codes) = (description.decoder()?, description.codes()?);
+        let modelled_samples = &self.representatives.samples;
+        let window = self.measurement.read_reflectance(view, self.bounds)?;
         let mut sums = Sums { views: 1, ..Sums::default() };
         let difference = |measured: usize, modelled: usize| {
-            let [a, b] = [window.value(measured), representatives.samples.value(modelled)];
+            let [a, b] = [window.value(measured), modelled_samples.value(modelled)];
             Some(a? - b?).filter(|difference| difference.is_finite())
         };
-        for (number, (&at, &cluster)) in offsets.iter().zip(&index).enumerate() {
+        for (number, (&at, &cluster)) in self.offsets.iter().zip(&self.index).enumerate() {
             let start = (usize::from(cluster) * description.views.len() + view) * texel;
             for sample in (0..texel).step_by(channels) {
                 let (measured, modelled) = (at * texel + sample, start + sample);
                 let code = codes.code(&window, measured);
-                sums.codes += u64::from(code.abs_diff(codes.code(&representatives.samples, modelled)));
+                sums.codes += u64::from(code.abs_diff(codes.code(modelled_samples, modelled)));
                 for channel in 0..channels {
                     match difference(measured + channel, modelled + channel) {
                         Some(difference) => sums.squares += difference * difference,
                         None => sums.left_out += 1,
                     }
                 }
-                if number % stride == 0 {
-                    let [a, b] =
-                        [decoder.rgb(&window, measured), decoder.rgb(&representatives.samples, modelled)];
+                if number % self.stride == 0 {
+                    let [a, b] = [decoder.rgb(&window, measured), decoder.rgb(modelled_samples, modelled)];
                     sums.add_colour(ciede2000(lab(a), lab(b)));
                 }
             }
             sums.code_count += description.lights.len() as u64;
         }
-        sums.sample_count = (offsets.len() * texel) as u64 - sums.left_out;
-        context.progress.advance(1);
+        sums.sample_count = (self.offsets.len() * texel) as u64 - sums.left_out;
         Ok(sums)
-    })?;
-    context.progress.end();
+    }
 
-    let mut elevations: Vec<(f64, Sums)> = Vec::new();
-    let mut order = views;
-    order.sort_by(|&a, &b| description.views[a].theta_rad.total_cmp(&description.views[b].theta_rad));
-    for view in order {
-        let theta = (description.views[view].degrees().0 * 1e6).round() / 1e6;
-        match elevations.last_mut() {
-            Some((last, group)) if *last == theta => *group = std::mem::take(group).add(&sums[view]),
-            _ => elevations.push((theta, sums[view].clone())),
+    /// Adds up the sums of all views, in their order.
+    fn report(&self, sums: &[Sums]) -> Report {
+        let views = &self.measurement.description().views;
+        let mut elevations: Vec<(f64, Sums)> = Vec::new();
+        let mut order: Vec<usize> = (0..views.len()).collect();
+        order.sort_by(|&a, &b| views[a].theta_rad.total_cmp(&views[b].theta_rad));
+        for view in order {
+            let theta = (views[view].degrees().0 * 1e6).round() / 1e6;
+            match elevations.last_mut() {
+                Some((last, group)) if *last == theta => *group = std::mem::take(group).add(&sums[view]),
+                _ => elevations.push((theta, sums[view].clone())),
+            }
+        }
+        Report {
+            elevations: elevations.iter().map(|(theta, sums)| sums.errors(Some(*theta))).collect(),
+            all: sums.iter().fold(Sums::default(), Sums::add).errors(None),
+            colour_texels: self.offsets.len().div_ceil(self.stride),
         }
     }
-    Ok(Report {
-        elevations: elevations.iter().map(|(theta, sums)| sums.errors(Some(*theta))).collect(),
-        all: sums.iter().fold(Sums::default(), Sums::add).errors(None),
-        colour_texels: offsets.len().div_ceil(stride),
-    })
 }

@@ -73,6 +73,13 @@ pub fn describe(source: &dyn Source, white: f64) -> Description {
     }
 }
 
+/// Memory of one view in flight: its images, and both shards twice, as chunks and put together; and a file that is being
+/// decoded.
+pub(crate) fn unit_bytes(description: &Description, source: &dyn Source) -> u64 {
+    let codes = (description.size.texels() * description.lights.len()) as u64;
+    3 * description.view_bytes() + 2 * codes + source.bytes_beside_image()
+}
+
 /// Looks at the whole archive without decoding it, and fixes the recipe.
 pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>) -> Result<Plan<'a>> {
     let description = describe(source, options.white);
@@ -122,12 +129,8 @@ impl Plan<'_> {
         (0..self.description.views.len()).filter(|&view| self.options.shard.has(view))
     }
 
-    /// Memory of one view in flight: its images, and both shards twice, as chunks and put together; and a file that is
-    /// being decoded.
     fn unit_bytes(&self) -> u64 {
-        let view = self.description.view_bytes();
-        let codes = (self.description.size.texels() * self.description.lights.len()) as u64;
-        3 * view + 2 * codes + self.source.bytes_beside_image()
+        unit_bytes(&self.description, self.source)
     }
 
     /// Imports the views that are not in the store yet.

@@ -16,6 +16,7 @@ pub(crate) mod kept;
 pub mod loss;
 pub mod normals;
 pub mod sample;
+pub mod slurm;
 pub mod status;
 pub mod tile;
 pub mod verify;

@@ -147,6 +147,7 @@ fn use_it(path: &Path, context: &Context<'_>) {
                 encoding: Encoding::Png,
                 tile_side: 64,
                 overlap: 1,
+                shard: Shard::WHOLE,
             },
             context,
         )

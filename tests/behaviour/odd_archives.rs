@@ -216,13 +216,8 @@ fn angles_are_never_read_by_half() {
             let (_folder, root) = set(&three([&names[0], &names[1], &names[2]]));
             let said = refused(&root);
             if before != "l" {
-                let expected = [
-                    "behind the angle 0",
-                    "fractions with a point",
-                    "rename",
-                    "--table",
-                    &names[0],
-                ];
+                let expected =
+                    ["behind the angle 0", "fractions with a point", "rename", "--table", &names[0]];
                 assert!(expected.iter().all(|words| said.contains(words)), "{behind:?}: {said}");
                 // No pattern reads these.
                 assert!(!said.contains("--pattern"), "{behind:?}: {said}");

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::fixture::{assert_same, btf, fail, fixture, succeed};
+use crate::fixture::{assert_same, btf, copy, fail, fixture, succeed, tree_names};
 
 fn import(store: &Path, shard: &str) -> Command {
     let mut command = btf();
@@ -109,4 +109,111 @@ fn the_part_may_come_from_the_variables_of_a_scheduler() {
     let told = fail(command.envs(slurm.into_iter().zip(["7", "5", "7", "2"])), 2);
     assert!(told.contains("has holes") && told.contains("--shard $SLURM_ARRAY_TASK_ID/N"), "{told}");
     assert!(fail(&mut import(&store, "env"), 2).contains("no scheduler's variables"), "outside of a job");
+}
+
+#[test]
+fn parts_of_a_verification_find_together_what_one_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, store, file) in [
+        ("measurement", fixture().measurement(), "reflectance/c/4/0/0/0/0"),
+        ("enlarged", fixture().enlarged(), "index/c/1/0"),
+    ] {
+        let damaged = folder.path().join(format!("{name}.zarr"));
+        copy(&store, &damaged);
+        let verify = |store: &Path, shard: &str| {
+            let mut command = btf();
+            command.arg("verify").arg(store).args(["--shard", shard]);
+            if name == "enlarged" {
+                command.arg("--model").arg(fixture().model());
+            }
+            command
+        };
+        for shard in ["0/1", "0/2", "1/2", "2/99"] {
+            let told = succeed(&mut verify(&store, shard));
+            assert_eq!(told.contains("note: part"), shard != "0/1", "{name} {shard}: {told}");
+        }
+        let mut bytes = std::fs::read(damaged.join(file)).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(damaged.join(file), bytes).unwrap();
+        // View 4, and row of shards 1.
+        let [finds, others] = if name == "measurement" { ["0/2", "1/2"] } else { ["1/2", "0/2"] };
+        fail(&mut verify(&damaged, finds), 65);
+        succeed(&mut verify(&damaged, others));
+        fail(&mut verify(&damaged, "0/1"), 65);
+    }
+}
+
+#[test]
+fn parts_of_a_pyramid_in_any_order_and_twice_are_the_tiles_of_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let export = |name: &str, shard: &str| {
+        let mut command = btf();
+        command.arg("export").arg(fixture().enlarged()).arg(folder.path().join(name));
+        command.arg("--model").arg(fixture().model()).args([
+            "--deepzoom",
+            "--tile-size",
+            "64",
+            "--shard",
+            shard,
+        ]);
+        command
+    };
+    succeed(&mut export("whole.dzi", "0/1"));
+    let whole = folder.path().join("whole_files");
+    for (name, shards) in [
+        ("two.dzi", &["1/2", "0/2"][..]),
+        ("mixed.dzi", &["2/3", "2/3", "0/2", "0/3", "1/2"]),
+        ("many.dzi", &["7/40", "0/1"]),
+    ] {
+        let (last, before) = shards.split_last().unwrap();
+        for shard in before {
+            let told = succeed(&mut export(name, shard));
+            assert!(told.contains("tiles of other parts are missing"), "{name} {shard}: {told}");
+            assert!(!folder.path().join(name).exists(), "{name} {shard}");
+        }
+        let told = succeed(&mut export(name, last));
+        assert!(told.contains("a viewer of it"), "{name}: {told}");
+        assert_same(&folder.path().join(name.replace(".dzi", "_files")), &whole);
+        let description = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+        assert_eq!(description(name), description("whole.dzi"));
+        succeed(btf().arg("verify").arg(folder.path().join(name)));
+    }
+}
+
+#[test]
+fn parts_of_a_comparison_give_the_figures_of_one_and_damaged_ones_are_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let compare = |more: &[&str]| {
+        let mut command = btf();
+        command.arg("compare").args([fixture().model(), fixture().measurement()]).arg("--json").args(more);
+        command
+    };
+    let expected = succeed(&mut compare(&[]));
+    let sums = folder.path().join("sums");
+    let partial = ["--partial", sums.to_str().unwrap()];
+    let with = |more: &[&str]| compare(&[&partial, more].concat());
+    assert!(fail(&mut with(&["--reduce"]), 66).contains("0 of 9 views compared"));
+    for shard in ["2/4", "0/4", "2/4", "1/4"] {
+        let told = succeed(&mut with(&["--shard", shard]));
+        assert!(told.contains("of 9 views compared"), "{told}");
+        fail(&mut with(&["--reduce"]), 66);
+    }
+    // Whoever comes last tells the figures, by another number of parts too.
+    assert_eq!(succeed(&mut with(&["--shard", "1/2"])), expected);
+    assert_eq!(succeed(&mut with(&["--reduce"])), expected);
+    // A changed file counts as missing.
+    let files = tree_names(&sums);
+    assert_eq!(files.len(), 9);
+    let text = std::fs::read_to_string(&files[3]).unwrap();
+    std::fs::write(&files[3], text.replacen("\"codes\":", "\"codes\":1", 1)).unwrap();
+    assert!(fail(&mut with(&["--reduce"]), 66).contains("8 of 9 views"));
+    assert_eq!(succeed(&mut with(&[])), expected);
+    assert_eq!(std::fs::read_to_string(&files[3]).unwrap(), text);
+    // Another model has sums of its own.
+    let other = folder.path().join("other.zarr");
+    succeed(btf().arg("model").args([fixture().measurement(), other.clone()]).args(["--clusters", "5"]));
+    let mut command = btf();
+    command.arg("compare").args([&other, &fixture().measurement()]).args(partial).arg("--reduce");
+    assert!(fail(&mut command, 66).contains("0 of 9"));
 }

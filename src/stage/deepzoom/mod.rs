@@ -23,6 +23,7 @@ use crate::picture::deepzoom::pyramid::Pyramid;
 use crate::picture::deepzoom::{Encoding, page};
 use crate::run::progress::Counted;
 use crate::run::recipe::Recipe;
+use crate::run::shard::Shard;
 use crate::run::{Context, read_ahead};
 use crate::stage::image::{self, Scene, Subject};
 
@@ -52,6 +53,9 @@ pub struct Options {
     pub tile_side: usize,
     /// Pixels of its neighbours that a tile holds; at most half its side.
     pub overlap: usize,
+    /// The part of the rows of tiles of each level that this run encodes. All rows of the picture are gone through for
+    /// it; encoding is most of the work.
+    pub shard: Shard,
 }
 
 /// A pyramid, ready to be made.
@@ -61,6 +65,7 @@ pub struct Plan {
     encoding: Encoding,
     place: PyramidFiles,
     recipe: Value,
+    shard: Shard,
 }
 
 /// How it went.
@@ -74,6 +79,8 @@ pub struct Report {
     pub tiles_found: u64,
     /// Tiles written by this run.
     pub tiles_written: u64,
+    /// Whether all tiles are there, those of other parts too: then the page and the description are.
+    pub complete: bool,
     /// What tiles do not hold, a sentence each.
     pub notes: Vec<String>,
 }
@@ -109,7 +116,7 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
     let recipe = recipe.to_value()?;
     place.check(&recipe, context.existing)?;
     let pyramid = Pyramid { size: scene.size(), side, overlap };
-    let plan = Plan { scene, pyramid, encoding: options.encoding, place, recipe };
+    let plan = Plan { scene, pyramid, encoding: options.encoding, place, recipe, shard: options.shard };
     plan.place.expect_texts(&plan.texts()?, context.existing)?;
     Ok(plan)
 }
@@ -149,7 +156,7 @@ impl Plan {
         self.place.expect_texts(&texts, context.existing)?;
         let total = self.pyramid.tiles();
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
-        let tiles = Tiles { plan: self, context, found: AtomicU64::new(0) };
+        let tiles = Tiles { plan: self, context, found: AtomicU64::new(0), written: AtomicU64::new(0) };
         // What the tiles do not hold is found by going through the picture, and kept for those who find them done.
         let kept = self.place.state()?.and_then(|state| state.notes);
         let notes: Vec<String> = if let Some(notes) = kept.filter(|_| self.is_whole()) {
@@ -171,15 +178,21 @@ impl Plan {
             })?;
             self.scene.beyond().notes()
         };
-        self.end(&notes)?;
-        texts.iter().try_for_each(|(path, text)| self.place.write_beside(path, text, context.existing))?;
+        // Of several parts whoever comes last ends the pyramid.
+        let complete = self.shard == Shard::WHOLE || self.is_whole();
+        if complete {
+            self.end(&notes)?;
+            texts
+                .iter()
+                .try_for_each(|(path, text)| self.place.write_beside(path, text, context.existing))?;
+        }
         context.progress.end();
-        let found = tiles.found.into_inner();
         Ok(Report {
             size: [window.size.width, window.size.height],
             levels: self.pyramid.top() + 1,
-            tiles_found: found,
-            tiles_written: total - found,
+            tiles_found: tiles.found.into_inner(),
+            tiles_written: tiles.written.into_inner(),
+            complete,
             notes: self.scene.incomplete().map(str::to_owned).into_iter().chain(notes).collect(),
         })
     }
@@ -217,6 +230,7 @@ struct Tiles<'a> {
     plan: &'a Plan,
     context: &'a Context<'a>,
     found: AtomicU64,
+    written: AtomicU64,
 }
 
 impl Sink for Tiles<'_> {
@@ -228,7 +242,9 @@ impl Sink for Tiles<'_> {
             (0..columns).into_par_iter().try_for_each(|column| {
                 self.context.check_stop()?;
                 let path = self.plan.place.tile(level, tile_row, column);
-                if path.is_file() {
+                if !self.plan.shard.has(tile_row) {
+                    // Another part's.
+                } else if path.is_file() {
                     self.found.fetch_add(1, Ordering::Relaxed);
                 } else {
                     let tile = pyramid.tile(size, tile_row, column);
@@ -236,6 +252,7 @@ impl Sink for Tiles<'_> {
                     let rows = rows.chunks_exact(3 * size.width);
                     let pixels: Vec<u8> = rows.flat_map(|row| &row[columns.clone()]).copied().collect();
                     write_file(&path, &self.plan.encoding.encode(tile.size, &pixels)?)?;
+                    self.written.fetch_add(1, Ordering::Relaxed);
                 }
                 self.context.progress.advance(1);
                 Ok(())

@@ -62,7 +62,7 @@ impl Subject {
                 "{} is a model, whose plane is endless: say how much of it to judge with --size WIDTHxHEIGHT",
                 path.display()
             ))),
-            _ => Err(Error::input(format!(
+            (kind, _) => Err(Error::input(format!(
                 "{}: got a store of kind {kind}, expected an enlarged index or a model",
                 path.display()
             ))),

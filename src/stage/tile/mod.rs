@@ -19,7 +19,7 @@ use crate::run::{Context, Existing};
 use crate::shape::Size;
 use crate::stage::cluster::{expect_measurement, measurement_name};
 use crate::stage::{cluster, fit};
-use crate::store::measurement::Measurement;
+use crate::store::measurement::{Description, Measurement};
 pub use crate::store::model::tile::TileReport as Report;
 use crate::store::model::tile::{TileRecipe, cells};
 use crate::store::model::{Model, Stage};
@@ -113,22 +113,34 @@ fn range(choice: Choice, plane: Size, lattice: &Lattice, joins: bool) -> Result<
     }
 }
 
+/// Memory that is enough for every stage of a model of such a tile, as far as can be told before there is one.
+pub fn enough_for_model(
+    description: &Description,
+    choice: Choice,
+    clusters: &cluster::Options,
+    threads: usize,
+) -> u64 {
+    let texels = match choice {
+        Choice::Sized(size) => size.texels(),
+        _ => description.size.texels(),
+    };
+    let clustering = cluster::enough_bytes(clusters, description, texels, threads);
+    clustering.max(OWN_BYTES + memory_bytes(description).max(fit::memory_bytes(texels)))
+}
+
+/// Memory that choosing a tile of a measurement takes.
+fn memory_bytes(description: &Description) -> u64 {
+    description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64)
+}
+
 impl Plan {
-    /// Memory that is enough for every stage of a model of such a tile, as far as can be told before there is one.
+    /// As [`enough_for_model`], for this tile.
     pub fn enough_for_model(&self, clusters: &cluster::Options, threads: usize) -> u64 {
-        let description = self.measurement.description();
-        let texels = match self.choice {
-            Choice::Sized(size) => size.texels(),
-            _ => description.size.texels(),
-        };
-        let clustering = cluster::enough_bytes(clusters, description, texels, threads);
-        clustering.max(OWN_BYTES + self.memory_bytes().max(fit::memory_bytes(texels)))
+        enough_for_model(self.measurement.description(), self.choice, clusters, threads)
     }
 
-    /// Memory that choosing the tile takes.
     fn memory_bytes(&self) -> u64 {
-        let description = self.measurement.description();
-        description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64)
+        memory_bytes(self.measurement.description())
     }
 
     /// What would be done.

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::report::{Finding, MOST_FINDINGS, OLDEST_NOTE, Report, consolidated, kept, unfinished};
 use crate::error::{ErrorKind, Result};
 use crate::run::progress::Counted;
+use crate::run::shard::Shard;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
 use crate::stage::image::model_of;
@@ -22,8 +23,8 @@ struct Tile {
     normals: Option<Vec<[f32; 3]>>,
 }
 
-/// Reads all of an enlarged index; its model is the one named, or lies beside it.
-pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> Result<Report> {
+/// Reads all of an enlarged index, or a part of its rows of shards; its model is the one named, or lies beside it.
+pub(super) fn run(path: &Path, model: Option<&Path>, shard: Shard, context: &Context<'_>) -> Result<Report> {
     let enlarged = Enlarged::open(path)?;
     let mut report = Report::new(KIND);
     let tile = tile(&enlarged, path, model, &mut report)?;
@@ -43,6 +44,11 @@ pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> R
             missing: true,
         });
     }
+    let whole = found.len() == total;
+    let found: Vec<[usize; 2]> = found.into_iter().filter(|&[row, _]| shard.has(row)).collect();
+    if shard != Shard::WHOLE {
+        report.notes.push(shard.looked_at(found.len(), &counted(total, "shard")));
+    }
     context.progress.begin("verify", found.len() as u64, Counted::Items("shards"));
     let in_flight = units::in_flight(context, "verifying a shard", SHARD_BYTES)?;
     let findings = units::for_each(context, &found, in_flight, |&place| {
@@ -57,7 +63,7 @@ pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> R
     if enlarged.format() == OLDEST_FORMAT {
         report.notes.push(OLDEST_NOTE.to_owned());
     } else if !enlarged.is_finished()? {
-        if found.len() == total && intact {
+        if whole && intact {
             report.findings.push(unfinished(path));
         }
     } else {
@@ -65,7 +71,7 @@ pub(super) fn run(path: &Path, model: Option<&Path>, context: &Context<'_>) -> R
         let mut rows: Vec<usize> = found.iter().map(|&[row, _]| row).collect();
         rows.dedup();
         // What is missing or damaged is told already.
-        for row in rows.into_iter().filter(|_| intact && found.len() == total) {
+        for row in rows.into_iter().filter(|_| intact && whole) {
             for folder in report.keep("checksums", enlarged.exchanged(row))?.unwrap_or_default() {
                 let what = format!(
                     "{}: the checksum of this row of shards is not the one that was kept: one was exchanged",

@@ -9,6 +9,7 @@ use crate::archive::{Source, read_groups};
 use crate::color::Remarkable;
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
+use crate::run::shard::Shard;
 use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::store::measurement::gather::{self, Images};
@@ -57,17 +58,24 @@ pub struct Damage {
 /// Images with differences that are named one by one.
 const NAMED_IMAGES: usize = 20;
 
-/// Reads all of a measurement and, where a source is given, all of its archive.
+/// Reads all of a measurement, or a part of its views; and, where a source is given, its archive.
 ///
 /// # Errors
 /// An archive of another shape, and those of the operating system; what is damaged is reported.
-pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Context<'_>) -> Result<Report> {
+pub fn run(
+    measurement: &Measurement,
+    source: Option<&dyn Source>,
+    shard: Shard,
+    context: &Context<'_>,
+) -> Result<Report> {
     let description = measurement.description();
     if let Some(source) = source {
         expect_same_shape(measurement, source)?;
     }
     // A view is looked at where anything has the name of one of its files: a pipe there is damage, not a view to come.
-    let (found, missing): (Vec<usize>, Vec<usize>) = (0..description.views.len())
+    let n_views = description.views.len();
+    let (found, missing): (Vec<usize>, Vec<usize>) = (0..n_views)
+        .filter(|&view| shard.has(view))
         .partition(|&view| measurement.has_view(view) || measurement.obstructed(view));
     context.progress.begin("verify", found.len() as u64, Counted::Items("views"));
     let view = description.view_bytes();
@@ -103,6 +111,9 @@ pub fn run(measurement: &Measurement, source: Option<&dyn Source>, context: &Con
         different: source.map(|_| different.into_inner()),
         ..Report::default()
     };
+    if shard != Shard::WHOLE {
+        report.notes.push(shard.looked_at(found.len(), &counted(n_views, "view")));
+    }
     other_findings(measurement, &mut report)?;
     for (damaged, remarkable, images) in views {
         report.damaged.extend(damaged);
@@ -121,7 +132,7 @@ fn other_findings(measurement: &Measurement, report: &mut Report) -> Result<()> 
     if measurement.format() == OLDEST_FORMAT {
         report.notes.push(OLDEST_NOTE.to_owned());
     } else if !measurement.is_finished()? {
-        if report.views_missing.is_empty() {
+        if (0..measurement.description().views.len()).all(|view| measurement.has_view(view)) {
             findings.push(unfinished(measurement.path()));
         }
     } else {

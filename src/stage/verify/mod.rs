@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::archive::Source;
 use crate::error::{Error, Result};
 use crate::run::Context;
+use crate::run::shard::Shard;
 use crate::stage::deepzoom;
 use crate::store::kind_of;
 use crate::store::measurement::Measurement;
@@ -26,7 +27,7 @@ pub use report::{Finding, Report};
 pub enum Found {
     /// Of a measurement.
     Measurement {
-        /// Number of views that it should have.
+        /// Number of views that it should have, or this part of it.
         views: usize,
         /// What was found.
         #[serde(flatten)]
@@ -36,13 +37,15 @@ pub enum Found {
     Other(Report),
 }
 
-/// What else may be compared with.
+/// What else may be compared with, and how much is looked at.
 #[derive(Default)]
 pub struct Beside<'a> {
     /// The archive of a measurement.
     pub source: Option<&'a dyn Source>,
     /// The model of an enlarged index; beside it where absent.
     pub model: Option<PathBuf>,
+    /// The part of the views, or of the rows of shards, that is looked at.
+    pub shard: Shard,
 }
 
 /// Reads all of what lies at a path.
@@ -60,14 +63,23 @@ pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Fo
     if beside.model.is_some() && kind != Some(index::KIND) {
         return Err(refused("only an enlargement is compared with its model").hint("leave out --model"));
     }
+    if beside.shard != Shard::WHOLE && !matches!(kind, Some(measured::KIND | index::KIND)) {
+        let what = "only measurements and enlargements are verified in parts, and this is neither";
+        return Err(refused(what).hint("leave out --shard"));
+    }
     Ok(match kind {
         None => Found::Other(deepzoom::verify(path, context)?),
         Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
-        Some(index::KIND) => Found::Other(enlarged::run(path, beside.model.as_deref(), context)?),
+        Some(index::KIND) => {
+            Found::Other(enlarged::run(path, beside.model.as_deref(), beside.shard, context)?)
+        }
         Some(_) => {
             let measurement = Measurement::open(path)?;
-            let report = Box::new(measurement::run(&measurement, beside.source, context)?);
-            Found::Measurement { views: measurement.description().views.len(), report }
+            let report = measurement::run(&measurement, beside.source, beside.shard, context)?;
+            Found::Measurement {
+                views: report.views_found + report.views_missing.len(),
+                report: Box::new(report),
+            }
         }
     })
 }

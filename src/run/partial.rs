@@ -1,0 +1,123 @@
+//! Results of single units, kept in a folder until all are there to be put together: for work whose result is a few
+//! numbers, so that many jobs can share it.
+//!
+//! There is one file a unit, not one a job, so that the number of jobs changes nothing. A file is named by the digest of
+//! all that its content depends on, and appears whole or not at all; two jobs that make the same write the same.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+
+use crate::disk::output::expect_outside_stores;
+use crate::disk::temporary::{Temporary, write_file};
+use crate::error::{Error, Result};
+use crate::run::recipe;
+use crate::run::shard::Shard;
+
+/// The most bytes that the result of a unit takes.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Where results of units are kept, and what a run does about them.
+#[derive(Clone, Debug)]
+pub struct Sharing {
+    /// The folder.
+    pub folder: PathBuf,
+    /// The part of the units that this run does; none where it only puts results together.
+    pub shard: Option<Shard>,
+}
+
+/// Results of the units of one work.
+pub(crate) struct Partial {
+    folder: PathBuf,
+    /// What each file has to hold: the digest of the work.
+    digest: String,
+}
+
+impl Partial {
+    /// Results in a folder, which is made; `what` is all that they depend on.
+    ///
+    /// # Errors
+    /// Those of making the folder, and a place inside of a store.
+    pub(crate) fn at(folder: &Path, what: &Value) -> Result<Self> {
+        let digest = recipe::digest(what);
+        let folder = folder.join(recipe::shortened(&digest));
+        expect_outside_stores(&folder)?;
+        std::fs::create_dir_all(&folder).map_err(|error| Error::io("make", &folder, error))?;
+        Ok(Self { folder, digest })
+    }
+
+    /// Where they lie.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn path(&self, unit: usize) -> PathBuf {
+        self.folder.join(format!("{unit}.json"))
+    }
+
+    /// The result of a unit; `None` where it is not there, or damaged: then it has to be made again.
+    pub(crate) fn read<T: DeserializeOwned>(&self, unit: usize) -> Option<T> {
+        let path = self.path(unit);
+        let file = path.metadata().ok()?;
+        if !file.is_file() || file.len() > MOST_BYTES {
+            return None;
+        }
+        let mut document: Value = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
+        let value = document.get_mut("value")?.take();
+        let seal = document.get("digest")?.as_str()?;
+        if seal != self.seal(unit, &value) {
+            return None;
+        }
+        serde_json::from_value(value).ok()
+    }
+
+    /// Keeps the result of a unit.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub(crate) fn write<T: Serialize>(&self, unit: usize, value: &T) -> Result<()> {
+        let value = serde_json::to_value(value).map_err(|error| Error::internal(error.to_string()))?;
+        let document = json!({"digest": self.seal(unit, &value), "value": value});
+        let path = self.path(unit);
+        Temporary::sweep_beside(&path);
+        write_file(&path, document.to_string().as_bytes())
+    }
+
+    /// The digest of a unit's result within this work.
+    fn seal(&self, unit: usize, value: &Value) -> String {
+        recipe::digest(&json!({"work": self.digest, "unit": unit, "value": value}))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_result_comes_back_as_it_was_and_a_changed_or_exchanged_one_does_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let partial = Partial::at(folder.path(), &json!({"a": 1})).unwrap();
+        let values = vec![0.1 + 0.2, 1.0 / 3.0, f64::MAX, 5e-324, 1e16 + 2.0];
+        partial.write(3, &values).unwrap();
+        assert_eq!(partial.read::<Vec<f64>>(3), Some(values.clone()));
+        assert_eq!(partial.read::<Vec<f64>>(2), None);
+        // Another work has its own.
+        let other = Partial::at(folder.path(), &json!({"a": 2})).unwrap();
+        assert_eq!(other.read::<Vec<f64>>(3), None);
+        std::fs::copy(partial.path(3), partial.path(4)).unwrap();
+        std::fs::copy(partial.path(3), other.path(3)).unwrap();
+        assert_eq!((partial.read::<Vec<f64>>(4), other.read::<Vec<f64>>(3)), (None, None));
+        let bytes = std::fs::read(partial.path(3)).unwrap();
+        for at in 0..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[at] ^= 1;
+            std::fs::write(partial.path(3), &changed).unwrap();
+            assert_ne!(partial.read::<Vec<f64>>(3), Some(values.clone()), "byte {at}");
+            std::fs::write(partial.path(3), &bytes[..at]).unwrap();
+            assert_eq!(partial.read::<Vec<f64>>(3), None, "cut after {at}");
+        }
+    }
+}

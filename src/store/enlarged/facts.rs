@@ -118,7 +118,7 @@ impl EnlargeRecipe {
                 _ => {}
             }
         }
-        let joins = |[height, width]: [usize; 2]| self.size[0] % height == 0 && self.size[1] % width == 0;
+        let joins = |tile: [usize; 2]| self.size.iter().zip(tile).all(|(side, of)| side.is_multiple_of(of));
         let laid = matches!(rule, Method::Repeat | Method::Tiles);
         match tile.filter(|tile| self.tileable && laid && !joins(*tile)) {
             None => Ok(()),

@@ -52,7 +52,7 @@ impl Model {
             format!("view: got {} of {views}", report.view)
         } else if report.lights != lights {
             format!("lights: got {}, expected {lights}", report.lights)
-        } else if !(length <= 1.0 + f64::from(UNIT_TOLERANCE)) {
+        } else if !(0.0..=1.0 + f64::from(UNIT_TOLERANCE)).contains(&length) {
             format!("mean: got {:?}, no mean of unit vectors", report.mean)
         } else if !(0.0..=180.0).contains(&report.spread_deg) {
             format!("spread_deg: got {}, expected 0 to 180", report.spread_deg)

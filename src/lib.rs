@@ -59,8 +59,8 @@
 //! # Where things are
 //!
 //! [`stage`] holds what each command does, [`method`] the steps of the paper as pure computation, [`check`] what can be
-//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean. [`run`]
-//! makes long work survive. Rooms that the page does not list (kernels, Zarr, files) are no part of the interface.
+//! wrong with a measurement. [`archive`] reads what others publish, [`store`] says what our own files mean. [`render`] makes pictures of a
+//! material on objects. [`run`] makes long work survive. Rooms that the page does not list (kernels, Zarr, files) are no part of the interface.
 //!
 //! # Errors
 //!
@@ -93,12 +93,14 @@ pub mod lattice;
 pub mod likeness;
 pub mod method;
 pub mod picture;
+pub mod render;
 pub mod run;
 pub mod sample;
 pub mod shape;
 mod signal;
 pub mod stage;
 pub mod store;
+pub mod view;
 
 // For the program, the tests and the benches of this package; no part of the interface.
 #[doc(hidden)]

@@ -23,6 +23,8 @@ mod coherent_damage;
 mod coherent_example;
 #[path = "behaviour/command_line.rs"]
 mod command_line;
+#[path = "behaviour/components.rs"]
+mod components;
 #[path = "behaviour/contradictions.rs"]
 mod contradictions;
 #[path = "behaviour/crafted_stores.rs"]
@@ -78,6 +80,8 @@ mod readme;
 mod real_data;
 #[path = "behaviour/recipes.rs"]
 mod recipes;
+#[path = "behaviour/rendering.rs"]
+mod rendering;
 #[path = "behaviour/resident_memory.rs"]
 mod resident_memory;
 #[path = "behaviour/safety.rs"]
@@ -92,3 +96,5 @@ mod slurm;
 mod tiles;
 #[path = "behaviour/verify.rs"]
 mod verify;
+#[path = "behaviour/viewer.rs"]
+mod viewer;

@@ -1,8 +1,8 @@
 //! Which file is the image of which view and light, and what is missing.
 
-use std::collections::HashMap;
 use std::fmt;
 
+use crate::spare::{Without, kept, spare};
 use crate::words::counted;
 use crate::{Angles, azimuth_digits, six_digits};
 
@@ -32,16 +32,6 @@ pub struct Catalogue {
     /// Position in the list of names, `[view][light]`, of those that are not left out.
     images: Vec<usize>,
     ignored: usize,
-}
-
-/// Views and lights that need no images, by their numbers in the sorted lists of all directions that names give.
-/// Numbers that there are none of say nothing.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Without {
-    /// Views.
-    pub views: Vec<usize>,
-    /// Lights.
-    pub lights: Vec<usize>,
 }
 
 /// One view and one light.
@@ -340,53 +330,6 @@ fn gaps(
     let grid = views.iter().flat_map(move |&view| lights.iter().map(move |&light| (view, light)));
     let mut present = present.peekable();
     grid.filter(move |cell| present.next_if_eq(cell).is_none())
-}
-
-/// The number of each direction among those that are not left out.
-fn kept(count: usize, without: &[usize]) -> Vec<Option<usize>> {
-    let mut next = 0usize;
-    let number = |at| {
-        if without.contains(&at) {
-            return None;
-        }
-        let number = next;
-        next = next.saturating_add(1);
-        Some(number)
-    };
-    (0..count).map(number).collect()
-}
-
-/// Views and lights without which none of these cells is left, most faults first; none where more than a few are
-/// needed, or nothing would be left.
-fn spare(mut faults: Vec<Cell>, views: usize, lights: usize) -> Option<Without> {
-    const A_FEW: usize = 6;
-    let mut spare = Without::default();
-    while !faults.is_empty() {
-        let most = |numbers: &mut dyn Iterator<Item = usize>| {
-            let mut counts: HashMap<usize, usize> = HashMap::new();
-            numbers.for_each(|number| {
-                let count = counts.entry(number).or_default();
-                *count = count.saturating_add(1);
-            });
-            // Of equal ones the first, whatever the order in the map.
-            counts.into_iter().max_by_key(|&(number, count)| (count, std::cmp::Reverse(number)))
-        };
-        let view = most(&mut faults.iter().map(|cell| cell.0))?;
-        let light = most(&mut faults.iter().map(|cell| cell.1))?;
-        // Where one picture is missing, it costs fewer images to leave out its view if there are more views.
-        if (view.1, views) >= (light.1, lights) {
-            spare.views.push(view.0);
-            faults.retain(|cell| cell.0 != view.0);
-        } else {
-            spare.lights.push(light.0);
-            faults.retain(|cell| cell.1 != light.0);
-        }
-        let too_many = spare.views.len().saturating_add(spare.lights.len()) > A_FEW;
-        if too_many || spare.views.len() >= views || spare.lights.len() >= lights {
-            return None;
-        }
-    }
-    Some(spare)
 }
 
 fn count(n: usize) -> u64 {

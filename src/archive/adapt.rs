@@ -5,7 +5,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use btfkit_formats::{About, Contents, Direction, SampleType, Samples, f16};
+use btfkit_formats::{About, Contents, SampleType, Samples, f16};
 use serde::{Deserialize, Serialize};
 
 use super::{Reading, Source};
@@ -108,81 +108,6 @@ impl Adaptation {
         self.samples = self.samples.filter(|&name| SampleType::from(name) != of.sample_type);
         self
     }
-
-    /// Lights and views as the archive has them, by their numbers, that are left out: light and view may be exchanged.
-    pub(super) fn dropped(&self) -> [&[usize]; 2] {
-        let [mut lights, mut views] = [&self.drop_lights, &self.drop_views].map(Vec::as_slice);
-        if self.swap {
-            std::mem::swap(&mut lights, &mut views);
-        }
-        [lights, views]
-    }
-
-    /// Numbers of the lights and of the views that are kept.
-    fn kept(&self, of: &Contents, path: &Path) -> Result<[Vec<usize>; 2]> {
-        let mut counts = [of.lights.len(), of.views.len()];
-        if self.swap {
-            counts.reverse();
-        }
-        let [lights, views] = counts;
-        let kept = |what: &str, count: usize, dropped: &[usize]| {
-            let path = path.display();
-            if let Some(&beyond) = dropped.iter().find(|&&number| number >= count) {
-                return Err(Error::usage(format!("{path}: no {what} {beyond} to drop, there are {count}")));
-            }
-            let kept: Vec<usize> = (0..count).filter(|number| !dropped.contains(number)).collect();
-            if kept.is_empty() {
-                return Err(Error::usage(format!("{path}: no {what} is left")));
-            }
-            Ok(kept)
-        };
-        Ok([kept("light", lights, &self.drop_lights)?, kept("view", views, &self.drop_views)?])
-    }
-
-    /// All lights and views, mended.
-    fn directions(&self, of: &Contents, views_are_assumed: bool) -> [Vec<Direction>; 2] {
-        let turn = f64::from(self.turn_deg).to_radians();
-        let mended = |list: &[Direction], elevations: bool, mirrored: bool| {
-            let mend = |direction: &Direction| {
-                let Direction { theta_rad, phi_rad } =
-                    if elevations { of_elevation(*direction) } else { *direction };
-                let phi_rad = if mirrored { -phi_rad } else { phi_rad };
-                let turned = (phi_rad + turn).rem_euclid(std::f64::consts::TAU);
-                Direction { theta_rad, phi_rad: turned }
-            };
-            list.iter().map(mend).collect::<Vec<_>>()
-        };
-        let mut lists = [&of.lights, &of.views];
-        // A view that no name gives is frontal, and no elevation.
-        let mut given = [true, !views_are_assumed];
-        if self.swap {
-            lists.reverse();
-            given.reverse();
-        }
-        let [elevations, mirrored] = [self.elevations, self.mirrored].map(Side::lights_and_views);
-        std::array::from_fn(|side| mended(lists[side], elevations[side] && given[side], mirrored[side]))
-    }
-}
-
-/// The direction whose elevation above the surface stands where its angle from the normal should.
-pub(crate) fn of_elevation(direction: Direction) -> Direction {
-    let (elevation_deg, phi_deg) = direction.degrees();
-    // Without the noise of the conversion, so that it is what a name with theta would give.
-    let theta_deg = ((90.0 - elevation_deg) * 1e9).round().max(0.0) / 1e9;
-    Direction::from_degrees(theta_deg, if theta_deg > 0.0 { phi_deg } else { 0.0 })
-}
-
-/// That no two directions are straight above: their azimuths told them apart while they were on the horizon.
-fn expect_distinct(list: &[Direction], what: &str, path: &Path) -> Result<()> {
-    let mut above = (0..list.len()).filter(|&number| list[number].theta_rad == 0.0);
-    match (above.next(), above.next()) {
-        (Some(first), Some(second)) => Err(Error::input(format!(
-            "{}: the {what} {first} and {second} are both straight above as elevations of 90 degrees, expected one",
-            path.display()
-        ))
-        .hint("if these angles are no elevations, leave out --polar; else leave all but one of them out by --drop-view or --drop-light")),
-        _ => Ok(()),
-    }
 }
 
 /// The source as it should have been.
@@ -206,13 +131,8 @@ pub(super) fn adapt(inner: Box<dyn Source>, reading: Reading) -> Result<Box<dyn 
         About::Transfer => adaptation.transfer.is_none(),
         About::Views | About::Other => true,
     });
-    let views_are_assumed = of.assumptions.iter().any(|assumption| assumption.about == About::Views);
     let [kept_lights, kept_views] = adaptation.kept(of, inner.path())?;
-    let [mut lights, mut views] = adaptation.directions(of, views_are_assumed);
-    if adaptation.elevations.is_some() {
-        expect_distinct(&lights, "lights", inner.path())?;
-        expect_distinct(&views, "views", inner.path())?;
-    }
+    let [mut lights, mut views] = adaptation.directions(of, inner.path())?;
     lights = kept_lights.iter().map(|&light| lights[light]).collect();
     views = kept_views.iter().map(|&view| views[view]).collect();
     (contents.lights, contents.views) = (lights, views);
@@ -393,6 +313,8 @@ pub(crate) fn half(value: f64) -> f16 {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use btfkit_formats::Direction;
+
     use super::*;
 
     fn adapted(

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use btfkit_formats::named::{self, Pattern, natural_order};
+use btfkit_formats::named::{self, Pattern};
 use btfkit_formats::{
     Angles, Assumption, Catalogue, CatalogueErrors, Doubt, Limits, Pair, Without, rti, table, ubo2003,
 };
 
 use super::files::{Files, has_extension, is_picture};
 use super::matching::{Listed, Matcher};
-use super::{Options, list_of_bounded_size, read_beside};
+use super::{Options, list_of_bounded_size, read_beside, unnamed};
 use crate::error::{Error, ErrorKind, Result};
 use crate::words::counted;
 
@@ -251,7 +251,9 @@ fn read_light_list(files: &Files, list: usize, limits: &Limits) -> Result<Lights
         .collect();
     let (pairs, remark) = match named {
         Some(rows) => match_files(Path::new(name), files, rows)?,
-        None => in_order(name, files, lights.lamps.iter().map(|lamp| frontal(lamp.light)).collect())?,
+        None => {
+            unnamed::in_order(name, files, lights.lamps.iter().map(|lamp| frontal(lamp.light)).collect())?
+        }
     };
     Ok(Lights {
         pairs,
@@ -292,93 +294,6 @@ fn match_files(
         let names = counted(different, "name");
         format!("{names} in {} not quite as the pictures have it: {example}", list.display())
     });
-    Ok((pairs, remark))
-}
-
-/// Pictures in the order of the numbers in their names are the lights of a list without names.
-fn in_order(list: &str, files: &Files, lights: Vec<Pair>) -> Result<(Vec<Option<Pair>>, Option<String>)> {
-    let mut pictures: Vec<usize> =
-        (0..files.len()).filter(|&number| is_picture(files.name(number))).collect();
-    pictures.sort_by(|&a, &b| natural_order(files.name(a), files.name(b)));
-    if pictures.len() != lights.len() {
-        return Err(Error::input(format!(
-            "{list}: got {} without names and {}, expected as many",
-            counted(lights.len(), "light"),
-            counted(pictures.len(), "picture")
-        )));
-    }
-    let neighbours = || pictures.iter().zip(pictures.iter().skip(1));
-    let name = |number: usize| files.name(number);
-    let small = |number: usize| name(number).to_lowercase();
-    let unsure = |&(&a, &b): &(&usize, &usize)| natural_order(&small(a), &small(b)).is_ge();
-    if let Some((&a, &b)) = neighbours().find(unsure) {
-        let found = format!(
-            "{list}: lights without names, and {} and {}, of which either may be first",
-            name(a),
-            name(b)
-        );
-        return Err(Error::input(found).hint("put the names of the pictures into the list"));
-    }
-    // Names that differ in more than a number have an order that is hardly meant: left.png, right.png.
-    let without_numbers = |number: usize| {
-        let name = small(number);
-        let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem).to_owned();
-        stem.split(|c: char| c.is_ascii_digit())
-            .filter(|part| !part.is_empty())
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
-    let has_number = |number: usize| {
-        let name = name(number);
-        name.rsplit_once('.').map_or(name, |(stem, _)| stem).contains(|c: char| c.is_numeric())
-    };
-    if let Some(&plain) = pictures.iter().find(|&&number| !has_number(number))
-        && pictures.len() > 1
-    {
-        let found = format!("{list}: lights without names, and {}, which has no number", name(plain));
-        return Err(Error::input(found).hint("put the names of the pictures into the list"));
-    }
-    if let Some((&a, &b)) = neighbours().find(|&(&a, &b)| without_numbers(a) != without_numbers(b)) {
-        let found = format!(
-            "{list}: lights without names, and {} and {}, which differ in more than their numbers",
-            name(a),
-            name(b)
-        );
-        return Err(Error::input(found).hint("put the names of the pictures into the list"));
-    }
-    // The order of 0.5 and 0.10 is another one for fractions than for two numbers.
-    let fraction = |number: usize| {
-        let name = name(number);
-        let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem).as_bytes();
-        stem.windows(3).any(|three| {
-            three[0].is_ascii_digit() && matches!(three[1], b'.' | b',') && three[2].is_ascii_digit()
-        })
-    };
-    if let Some(&number) = pictures.iter().find(|&&number| fraction(number)) {
-        let found =
-            format!("{list}: lights without names, and {}, whose number may have a fraction", name(number));
-        return Err(Error::input(found).hint("put the names of the pictures into the list"));
-    }
-    let other_digits = |name: &str| name.contains(|c: char| c.is_numeric() && !c.is_ascii_digit());
-    if let Some(&number) = pictures.iter().find(|&&number| other_digits(name(number))) {
-        let found = format!(
-            "{list}: lights without names, and {}, whose number has digits other than 0 to 9",
-            name(number)
-        );
-        return Err(Error::input(found).hint("put the names of the pictures into the list"));
-    }
-    let ends = pictures.first().zip(pictures.last());
-    let remark = ends.map(|(&first, &last)| {
-        format!(
-            "the list has no names: its lights are those of the pictures in the order of the numbers in their names, from {} to {}",
-            name(first),
-            name(last)
-        )
-    });
-    let mut pairs = vec![None; files.len()];
-    for (number, pair) in pictures.into_iter().zip(lights) {
-        pairs[number] = Some(pair);
-    }
     Ok((pairs, remark))
 }
 

@@ -7,12 +7,14 @@ pub mod adapt;
 mod as_options;
 mod catalogue;
 mod container;
+pub(crate) mod directions;
 mod files;
 pub mod hdf5;
 mod instead;
 mod matching;
 mod pictures;
 mod plausibility;
+mod unnamed;
 
 use std::io::Read;
 use std::ops::Range;

@@ -7,13 +7,14 @@ use btfkit::run::Context;
 use btfkit::run::partial::Sharing;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
+use btfkit::stage::compare::By;
 use btfkit::stage::{compare, image};
 use btfkit::store;
 use btfkit::store::measurement::Measurement;
 use btfkit::store::model::{self, Model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::table::{row, table};
 use super::{Console, as_json};
@@ -41,6 +42,9 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
+    /// What of the model is compared [default: clusters, if it has them]
+    #[arg(long, value_enum)]
+    by: Option<ByName>,
     /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
     #[arg(long, value_name = "DIR")]
     partial: Option<PathBuf>,
@@ -53,6 +57,14 @@ pub(super) struct Compare {
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ByName {
+    /// Its clusters
+    Clusters,
+    /// Its components
+    Components,
 }
 
 impl Compare {
@@ -69,12 +81,17 @@ impl Compare {
         let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
         let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
         let (model, measurement) = compare::open(&options)?;
+        let by = match self.by {
+            Some(ByName::Clusters) => By::Clusters,
+            Some(ByName::Components) => By::Components,
+            None => By::of(&model)?,
+        };
         let report = match &self.partial {
-            None => compare::run(&model, &measurement, context)?,
+            None => compare::run(&model, &measurement, by, context)?,
             Some(folder) => {
                 let shard = (!self.reduce).then_some(self.shard);
                 let sharing = Sharing { folder: folder.clone(), shard };
-                let shared = compare::run_shared(&model, &measurement, &sharing, context)?;
+                let shared = compare::run_shared(&model, &measurement, by, &sharing, context)?;
                 let Some(report) = shared.report else {
                     let views = counted(shared.views, "view");
                     console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
@@ -103,7 +120,9 @@ impl Compare {
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
-            if report.all.hues_are_lost() {
+            if by == By::Components {
+                console.line("by the components of the model");
+            } else if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
@@ -120,7 +139,7 @@ impl Compare {
         }
         match &self.picture {
             Some(path) => {
-                self.side_by_side(&model, &measurement, context)?.write(path, context.existing)?;
+                self.side_by_side(&model, &measurement, by, context)?.write(path, context.existing)?;
                 if !self.json {
                     let description = measurement.description();
                     let measured = [&description.views[..], &description.lights];
@@ -136,12 +155,18 @@ impl Compare {
         &self,
         model: &Model,
         measurement: &Measurement,
+        by: By,
         context: &Context<'_>,
     ) -> Result<Picture> {
         let tile = model.tile()?;
         let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
-        let colors = image::cluster_colors(model, self.view, self.light)?;
-        let modelled = image::look_up(tile.size, &model.index()?, &colors)?;
+        let modelled = match by {
+            By::Clusters => {
+                let colors = image::cluster_colors(model, self.view, self.light)?;
+                image::look_up(tile.size, &model.index()?, &colors)?
+            }
+            By::Components => image::of_components(model, self.view, self.light, context)?,
+        };
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]

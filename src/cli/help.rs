@@ -24,7 +24,7 @@ const GROUPS: [(&str, &[&str]); 8] = [
     ("Check", &["info", "check", "verify"]),
     ("Model", &["model", "tile", "cluster", "curve", "normals", "fit", "appearance", "compare"]),
     ("Enlarge", &["enlarge", "judge"]),
-    ("Look", &["image"]),
+    ("Look", &["image", "render", "view"]),
     ("Share work", &["slurm", "status", "missing"]),
     ("Set up", &["completions", "man", "help"]),
 ];

@@ -25,7 +25,7 @@ Examples:
 A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
 from the three views and three lights around them.")]
 pub(super) struct Image {
-    /// A measurement, a model or an enlargement
+    /// A measurement, a model, an enlargement or a packed model
     source: PathBuf,
     /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has
     /// at most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory

@@ -6,7 +6,7 @@ use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
 use btfkit::stage::deepzoom::recipe::PyramidRecipe;
 use btfkit::stage::verify::is_pyramid;
-use btfkit::stage::{estimate, import};
+use btfkit::stage::{estimate, import, pack};
 use btfkit::store::model::Stage;
 use btfkit::store::recognise::VERSION_2;
 use btfkit::words::counted;
@@ -68,6 +68,7 @@ struct Archive {
 enum Told {
     Archive(Box<Archive>),
     Store(About),
+    Packed(Box<pack::About>),
 }
 
 type Rows = Vec<Vec<String>>;
@@ -101,6 +102,10 @@ impl Info {
         if is_zarr || is_named_so || is_pyramid(first) {
             given.refuse_for_stores(paths)?;
             return about::store(first).map(Told::Store);
+        }
+        if pack::is_packed(first) {
+            given.refuse_for_stores(paths)?;
+            return pack::about(first).map(|about| Told::Packed(Box::new(about)));
         }
         let source = self.source.open(paths)?;
         let contents = source.contents();
@@ -143,6 +148,7 @@ fn rows(told: &Told) -> Rows {
         Told::Store(About::Model(about)) => of_model(about),
         Told::Store(About::Enlarged(about)) => of_enlarged(about),
         Told::Store(About::Deepzoom(about)) => of_pyramid(about),
+        Told::Packed(about) => of_packed(about),
     }
 }
 
@@ -201,6 +207,34 @@ fn of_measurement(about: &Measured) -> Rows {
     rows.push(row!["digest", about.digest]);
     rows.extend(of_kept(&about.kept));
     rows.extend(about.assumptions.iter().map(|assumption| row!["assumed", assumption]));
+    rows
+}
+
+fn of_packed(about: &pack::About) -> Rows {
+    let ([width, height], [views, lights]) = (about.size, about.directions);
+    let mut rows = vec![
+        row!["kind", about.kind],
+        row!["size", format!("{width}x{height}, {}", about.channels.join(" "))],
+        row!["views", views],
+        row!["lights", lights],
+        row!["borders join", yes(about.wraps)],
+        row!["bytes", about.bytes],
+    ];
+    if let Some(raw) = about.tile_bytes {
+        let ratio = raw as f64 / about.bytes.max(1) as f64;
+        rows.push(row!["the tile's samples", format!("{}, 1:{ratio:.0}", bytes_text(raw))]);
+    }
+    for (number, plane) in about.planes.iter().enumerate() {
+        let to = format!(
+            "to byte {}, {}, PSNR {:.2} dB",
+            plane.bytes,
+            counted(plane.components, "component"),
+            plane.psnr_db
+        );
+        rows.push(row![format!("plane {}", number + 1), to]);
+    }
+    rows.extend(about.texts.iter().map(|(name, text)| row![name, text]));
+    rows.extend(about.notes.iter().map(|note| row!["note", note]));
     rows
 }
 
@@ -290,6 +324,12 @@ fn of_model(about: &Modelled) -> Rows {
                 let etas: Vec<String> = report.levels.iter().map(|level| level.eta.to_string()).collect();
                 rows.push(row!["  neighbours", etas.join(", ")]);
                 rows.push(row!["  autocovariance error", format!("{:.4}", report.autocovariance_error)]);
+            }
+            "components" => {
+                let Some(report) = &about.components else { continue };
+                rows.push(row!["  components", report.components]);
+                rows.extend(report.psnr_db.map(|psnr| row!["  PSNR", format!("{psnr:.2} dB")]));
+                rows.push(row!["  arrays", bytes_text(report.bytes)]);
             }
             _ => {
                 let Some(report) = &about.appearance else { continue };

@@ -5,6 +5,7 @@ mod bytes;
 mod check;
 mod cluster;
 mod compare;
+mod components;
 mod curve;
 mod deepzoom;
 mod demo;
@@ -22,7 +23,9 @@ mod model;
 mod normals;
 mod number;
 mod outputs;
+mod pack;
 mod progress;
+mod render;
 mod sample;
 mod scene;
 mod slurm;
@@ -32,6 +35,7 @@ mod table;
 mod terminal;
 mod tile;
 mod verify;
+mod view;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -131,9 +135,14 @@ enum Command {
     Normals(normals::Normals),
     Fit(fit::Fit),
     Appearance(appearance::Appearance),
+    Components(components::Components),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
     Compare(compare::Compare),
     Enlarge(enlarge::Enlarge),
     Image(image::Image),
+    Render(render::Render),
+    View(view::View),
     Judge(judge::Judge),
     Status(status::StatusOf),
     Missing(status::Missing),
@@ -309,8 +318,13 @@ impl Command {
             Self::Normals(command) => command.run(context, console),
             Self::Fit(command) => command.run(context, console),
             Self::Appearance(command) => command.run(context, console),
+            Self::Components(command) => command.run(context, console),
+            Self::Pack(command) => command.run(context, console),
+            Self::Unpack(command) => command.run(context, console),
             Self::Compare(command) => command.run(context, console),
             Self::Image(command) => command.run(given, context, console),
+            Self::Render(command) => command.run(given, context, console),
+            Self::View(command) => command.run(context, console),
             Self::Judge(command) => command.run(context, console),
             Self::Completions(command) => command.run(console),
             Self::Man(command) => command.run(console),
@@ -361,7 +375,7 @@ impl Console {
     /// The first line of what is told of a stage.
     fn stage(self, label: &str, text: &str) {
         let found = if self.found { "found done: " } else { "" };
-        self.line(format!("{label:<10}{found}{text}"));
+        self.line(format!("{label:<9} {found}{text}"));
     }
 
     /// One line. Whatever it names cannot end it, or change what the terminal shows.

@@ -53,6 +53,8 @@ pub(super) struct SceneArgs {
 enum ValuesName {
     /// Those of the model's clusters
     Model,
+    /// Those of the model's components (btf components)
+    Components,
     /// Those that were measured where each texel comes from, so nothing is lost by clustering
     Measured,
 }
@@ -67,6 +69,10 @@ impl SceneArgs {
         if matches!(self.values, Some(ValuesName::Model)) {
             given
                 .refuse_these(&["measurement"], "beside --values model: values are those of the clusters")?;
+        }
+        if matches!(self.values, Some(ValuesName::Components)) {
+            let beside = "beside --values components: values are those of the components";
+            given.refuse_these(&["measurement"], beside)?;
         }
         match kind_at(source) {
             Some(measurement::KIND) => given.refuse_these(
@@ -86,6 +92,7 @@ impl SceneArgs {
             subject,
             values: match (self.values, &self.measurement) {
                 (Some(ValuesName::Model), _) | (None, None) => Values::Model,
+                (Some(ValuesName::Components), _) => Values::Components,
                 _ => Values::Measured(self.measurement.clone()),
             },
             plane: self.plane.then(|| PlaneOptions {

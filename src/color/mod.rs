@@ -4,6 +4,7 @@
 
 mod channels;
 mod codes;
+pub(crate) mod curve;
 mod display;
 pub mod samples;
 

@@ -38,6 +38,7 @@ use crate::stage::{appearance, cluster, compare, enlarge, fit, import, normals, 
 use crate::store::enlarged::Enlarged;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
+use crate::view::{self, Viewer};
 use crate::zarr::codec::Chain;
 
 /// What to demonstrate.
@@ -104,6 +105,7 @@ mod names {
     pub(super) const BY_PAPER: &str = "enlarged-by-paper.zarr";
     pub(super) const PICTURES: &str = "pictures";
     pub(super) const PAGE: &str = "index.html";
+    pub(super) const VIEWER: &str = "view.html";
     pub(super) const RECORD: &str = "demo.json";
 }
 
@@ -158,7 +160,7 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
     let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
     let compared = times.time("compare", false, || {
         let (model, measurement) = compare::open(&compare)?;
-        compare::run(&model, &measurement, context)
+        compare::run(&model, &measurement, compare::By::Clusters, context)
     })?;
     let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
@@ -166,6 +168,11 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
     let mut sections = story::sections(&figures, settings);
     let pictures = place(names::PICTURES);
     let embedded = times.time("pictures", false, || embed(&sections, &workshop, &pictures, context))?;
+    times.time("viewer", false, || {
+        let viewer =
+            Viewer::open(&view::Options { source: model.clone(), model: None, window: None }, context)?;
+        write_file(&place(names::VIEWER), viewer.page()?.as_bytes())
+    })?;
     sections.push(story::times(&times.steps));
     let page = place(names::PAGE);
     write_file(&page, page::render(&story::title(settings), &sections, &embedded).as_bytes())?;
@@ -309,6 +316,9 @@ mod tests {
         assert_eq!(page.matches("src=\"data:image/").count(), pictures);
         let text: String = page.lines().filter(|line| !line.contains("<img")).collect();
         assert!(text.contains("From 169 photographs of wood"));
+        assert!(text.contains("<iframe src=\"view.html\""));
+        let viewer = std::fs::read_to_string(folder.path().join("view.html")).unwrap();
+        assert!(viewer.contains("<canvas id=\"picture\""));
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
 
         let modified = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().modified().unwrap();
@@ -317,7 +327,7 @@ mod tests {
         let second = run_with(&settings, folder.path(), &context).unwrap();
         assert_eq!(made.map(modified), before);
         for (first, second) in first.steps.iter().zip(&second.steps) {
-            let anew = ["compare", "pictures"].contains(&first.name.as_str());
+            let anew = ["compare", "pictures", "viewer"].contains(&first.name.as_str());
             assert!(anew || first.seconds == second.seconds, "{first:?} became {second:?}");
         }
     }

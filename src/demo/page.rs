@@ -1,4 +1,4 @@
-//! The page: one HTML file that holds its pictures and its style and asks for nothing else.
+//! The page: one HTML file that holds its pictures and its style, and beside it asks for the viewer alone.
 
 use std::fmt::Write;
 
@@ -32,13 +32,16 @@ pub(super) fn render(title: &str, sections: &[Section], embedded: &[Embedded]) -
          measurement, reduced the tile to a few hundred measured reflectances, and covered a larger area with \
          them. The steps are those of Filip and Haindl, BTF modelling using BRDF texels (2007), with a newer \
          way to enlarge beside theirs.</p>\n\
-         <p>Click a picture to see it in full.</p>\n\
+         <iframe src=\"{viewer}\" title=\"The material of this page, to light and to turn\"></iframe>\n\
+         <p>Drag over the material: the light moves. Its surface never ends. <a href=\"{viewer}\">See it larger</a>, or click \
+         a picture below to see it in full.</p>\n\
          <nav>{links}</nav>\n</header>\n<main>\n{body}</main>\n\
          <footer>btfkit {version}. All pictures are also beside this page as PNG, in the folder \
          {pictures}.</footer>\n</body>\n</html>\n",
         style = include_str!("page.css"),
         version = env!("CARGO_PKG_VERSION"),
         pictures = names::PICTURES,
+        viewer = names::VIEWER,
     )
 }
 

@@ -11,7 +11,8 @@
 //! | look BTF values up between the measured directions | [`value`] |
 //!
 //! [`coherent`] enlarges without the field, by places in the tile; [`baseline`] holds simpler ways to compare with;
-//! [`components`] are the leading components of BRDFs that tile and coherent rule look at.
+//! [`components`] are the leading components of BRDFs that tile and coherent rule look at; [`principal`] are those of
+//! all samples, a model beside the clusters.
 
 pub mod baseline;
 pub mod cluster;
@@ -19,6 +20,7 @@ pub mod coherent;
 pub mod components;
 pub mod field;
 pub mod index;
+pub(crate) mod principal;
 pub mod stereo;
 pub mod tile;
 pub mod value;

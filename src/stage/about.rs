@@ -16,6 +16,7 @@ use crate::stage::{cluster, deepzoom, normals};
 use crate::store::enlarged::{self, Enlarged, Method};
 use crate::store::measurement::{self, Description, Measurement};
 use crate::store::model::appearance::AppearanceReport;
+use crate::store::model::components::ComponentsReport;
 use crate::store::model::field::FieldReport;
 use crate::store::model::tile::TileRecipe;
 use crate::store::model::tile::TileReport;
@@ -147,6 +148,9 @@ pub struct Modelled {
     pub field: Option<FieldReport>,
     /// How the exemplar is described.
     pub appearance: Option<AppearanceReport>,
+    /// Of components, once they are found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub components: Option<ComponentsReport>,
 }
 
 /// What an enlarged index is.
@@ -234,8 +238,11 @@ fn of_measurement(measurement: &Measurement, kept: impl Fn(u64, bool) -> Kept) -
 
 fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled> {
     let mut stages = Vec::new();
-    for stage in Stage::ALL {
+    for stage in Stage::ALL.into_iter().chain(Stage::OPTIONAL) {
         let recipe = model.recipe_text(stage)?;
+        if recipe.is_none() && Stage::OPTIONAL.contains(&stage) {
+            continue;
+        }
         let done = recipe.is_some() && model.has_arrays(stage)?;
         stages.push(Done { stage: stage.name(), done, recipe });
     }
@@ -252,6 +259,7 @@ fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled>
         normals: is_there(Stage::Normals).then(|| model.normals_report()).transpose()?,
         field: is_there(Stage::Fit).then(|| model.field_report()).transpose()?,
         appearance: is_there(Stage::Appearance).then(|| model.appearance_report()).transpose()?,
+        components: is_there(Stage::Components).then(|| model.report(Stage::Components)).transpose()?,
         stages,
     })
 }

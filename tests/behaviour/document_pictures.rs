@@ -46,13 +46,26 @@ impl Material {
         let window = format!("0,0,{PANEL},{PANEL}");
         let options = ["--view", "0,0", "--light", light, "--window", &window, "--out"];
         succeed(btf().arg("image").arg(self.folder.path().join(of)).args(options).arg(&out).arg("--force"));
-        let file = std::io::BufReader::new(std::fs::File::open(&out).unwrap());
-        let mut reader = png::Decoder::new(file).read_info().unwrap();
-        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-        let size = reader.next_frame(&mut bytes).unwrap();
-        let pixels = bytes.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(|v| f32::from(v) / 255.0));
-        Picture::display(Size::new(size.height as usize, size.width as usize), pixels.collect())
+        read(&out)
     }
+
+    /// A car interior covered with the endless plane of the model.
+    fn interior(&self) -> Picture {
+        let out = self.folder.path().join("interior.png");
+        let options = ["--plane", "--shape", "interior", "--size", "440x330", "--light", "40,110", "--out"];
+        succeed(btf().arg("render").arg(self.folder.path().join("s.model.zarr")).args(options).arg(&out));
+        read(&out)
+    }
+}
+
+/// A PNG of 8 bits.
+fn read(path: &Path) -> Picture {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let size = reader.next_frame(&mut bytes).unwrap();
+    let pixels = bytes.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(|v| f32::from(v) / 255.0));
+    Picture::display(Size::new(size.height as usize, size.width as usize), pixels.collect())
 }
 
 /// Rows of equally wide pictures as one.
@@ -87,7 +100,12 @@ fn pictures() -> Vec<(&'static str, Vec<u8>)> {
     let rows = [&leather, &wood].map(|material| {
         row(&["s.zarr", "repeat", "paper", "coherent"].map(|of| material.panel(of, LIGHTS[0])))
     });
-    vec![("leather.jpg", jpeg(&row(&first))), ("methods.jpg", jpeg(&stacked(&rows)))]
+    let interior = jpeg(&row(&[leather.interior(), wood.interior()]));
+    vec![
+        ("leather.jpg", jpeg(&row(&first))),
+        ("methods.jpg", jpeg(&stacked(&rows))),
+        ("interior.jpg", interior),
+    ]
 }
 
 fn samples(jpeg: &[u8]) -> Vec<u8> {

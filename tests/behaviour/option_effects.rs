@@ -56,6 +56,9 @@ use Shown::{Shows, Unseen};
 
 const ITSELF: Shown = Unseen("what the command is about");
 const OF_LARGER: Shown = Unseen("of materials larger than the fixture; judging.rs tries it");
+const OF_COMPONENTS: Shown =
+    Unseen("of a model with components, which the fixture has not; components.rs tries it");
+const OF_A_FILE: Shown = Unseen("of a file that a test makes; rendering.rs tries it");
 
 /// The options of every command that reads archives. What they do to the result is seen in the recipes of import; for
 /// stores they are refused.
@@ -119,6 +122,19 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
         ],
     },
     Outputs {
+        command: "view",
+        base: &["{model}", "--export", "{new}/p.html"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("export", ITSELF),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("window", Unseen("of enlargements; viewer.rs tries it")),
+            ("port", Unseen("of the server; viewer.rs tries it")),
+            ("open", Unseen("starts a browser")),
+        ],
+    },
+    Outputs {
         command: "status",
         base: &["{measurement}"],
         reads: false,
@@ -137,6 +153,7 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
     Outputs {
         command: "slurm",
         base: &["{archive}", "--out", "{new}/jobs", "--into", "/stores", "--size", "64x64"],
+        reads: false,
         options: &[
             ("inputs", ITSELF),
             ("out", Unseen("the place of the scripts")),
@@ -194,11 +211,31 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
                 Shows(&["--light", "30,90", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"]),
             ),
             ("view", Shows(&["--view", "15,0", "--picture", "{new}/p.png"], &["--picture", "{new}/p.png"])),
+            ("by", Unseen("the fixture's model has clusters alone; components.rs tries it")),
             ("partial", Shows(&["--partial", "{new}/sums"], &[])),
             ("shard", Shows(&["--partial", "{new}/sums", "--shard", "0/2"], &["--partial", "{new}/sums"])),
             ("reduce", Unseen("another way to the same figures; shares.rs tries it")),
             ("json", Shows(&["--json"], &[])),
         ],
+    },
+    Outputs {
+        command: "pack",
+        base: &["{model}", "{new}/m.btfc"],
+        reads: false,
+        options: &[
+            ("model", ITSELF),
+            ("output", ITSELF),
+            ("quality", OF_COMPONENTS),
+            ("licence", OF_COMPONENTS),
+            ("texel_mm", OF_COMPONENTS),
+            ("json", OF_COMPONENTS),
+        ],
+    },
+    Outputs {
+        command: "unpack",
+        base: &["{new}/m.btfc", "{new}/m.model.zarr"],
+        reads: false,
+        options: &[("file", ITSELF), ("model", ITSELF)],
     },
     Outputs {
         command: "image",
@@ -232,6 +269,47 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
                     &["--plane", "--window", "0,0,64,64"],
                 ),
             ),
+        ],
+    },
+    Outputs {
+        command: "render",
+        base: &["{model}", "--out", "{new}/r.png", "--size", "24x20"],
+        reads: false,
+        options: &[
+            ("source", ITSELF),
+            ("out", Unseen("the name of the result, and its format")),
+            ("size", Shows(&["--size", "25x20"], &[])),
+            ("shape", Shows(&["--shape", "cylinder"], &[])),
+            ("mesh", OF_A_FILE),
+            ("scale", Shows(&["--scale", "2"], &[])),
+            ("light", Shows(&["--light", "30,90"], &[])),
+            ("point_light", Shows(&["--point-light", "1,2,3"], &[])),
+            ("environment", OF_A_FILE),
+            ("environment_turn", OF_A_FILE),
+            ("environment_lights", OF_A_FILE),
+            ("show_environment", OF_A_FILE),
+            ("background", Shows(&["--background", "0.5"], &[])),
+            ("no_shadows", Shows(&["--shape", "interior", "--no-shadows"], &["--shape", "interior"])),
+            ("eye", Shows(&["--eye", "1,2,4"], &[])),
+            ("target", Shows(&["--target", "0.5,0,0"], &[])),
+            ("up", Shows(&["--up", "1,1,0"], &[])),
+            ("fov", Shows(&["--fov", "40"], &[])),
+            ("orthographic", Shows(&["--orthographic"], &[])),
+            ("samples", Shows(&["--samples", "1"], &[])),
+            ("exposure", Shows(&["--exposure", "2"], &[])),
+            ("quality", Shows(&["--out", "{new}/r.jpg", "--quality", "50"], &["--out", "{new}/r.jpg"])),
+            ("frames", Shows(&["--frames", "2", "--turntable"], &[])),
+            ("turntable", Shows(&["--frames", "2", "--turntable"], &["--frames", "2", "--light-sweep"])),
+            ("light_sweep", Shows(&["--frames", "2", "--light-sweep"], &["--frames", "2", "--turntable"])),
+            (
+                "shard",
+                Shows(&["--frames", "2", "--turntable", "--shard", "0/2"], &["--frames", "2", "--turntable"]),
+            ),
+            ("plane", Shows(&["--plane"], &[])),
+            ("seed", Shows(&["--plane", "--seed", "2"], &["--plane"])),
+            ("jitter", Shows(&["--plane", "--jitter", "0"], &["--plane"])),
+            ("model", Unseen("another model is refused, the right one is found without")),
+            ("compare", Shows(&["--compare"], &[])),
         ],
     },
     Outputs {
@@ -270,6 +348,10 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (&["image", "{model}", "--out", "{new}/x.png", "--seed", "2"], "--plane"),
     (&["image", "{model}", "--out", "{new}/x.png", "--jitter", "1"], "--plane"),
     (&["image", "{measurement}", "--out", "{new}/x.png", "--plane", "--window", "0,0,9,9"], "plane"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--quality", "50"], "--quality"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--shape", "flat", "--eye", "1,2,3"], "--eye"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--shape", "flat", "--background", "0"], "--background"),
+    (&["render", "{model}", "--out", "{new}/r.png", "--no-shadows"], "--no-shadows"),
     (&["compare", "{model}", "{measurement}", "--light", "30,0"], "--picture"),
     (&["compare", "{model}", "{measurement}", "--view", "30,0"], "--picture"),
     (&["judge", "{enlarged}", "--against", "{measurement}", "--size", "64x64"], "--size"),
@@ -410,6 +492,15 @@ pub(crate) const RECIPES: &[Recipes] = &[
             ("measurement", PLACE),
             ("model", PLACE),
             ("robust", Changes(&["--robust"])),
+            ("dry_run", TOLD),
+        ],
+    },
+    Recipes {
+        command: "components",
+        options: &[
+            ("measurement", PLACE),
+            ("model", PLACE),
+            ("components", Changes(&["--components", "5"])),
             ("dry_run", TOLD),
         ],
     },

@@ -22,6 +22,7 @@ fn dry_run(command: &str, fixture: &Fixture, folder: &Path) -> Command {
         "tile" | "model" => run.args([&fixture.measurement(), &new]),
         "cluster" | "normals" => run.args([&fixture.measurement(), &fixture.model()]),
         "fit" | "appearance" => run.arg(fixture.model()),
+        "components" => run.args([fixture.measurement(), fixture.model()]),
         "enlarge" => run.args([&fixture.model(), &new]).args(["--size", "64x64"]),
         "export" => run.args([&fixture.model(), &folder.join("new.dzi")]).arg("--deepzoom"),
         other => panic!("no arguments for {other}"),

@@ -97,7 +97,7 @@ fn jobs_for_a_material_with_an_awkward_name_make_what_one_process_makes() {
     assert_same(&store(".zarr"), &fixture().measurement());
     assert_same(&store(".model.zarr"), &fixture().model());
     let whole = folder.path().join("whole.zarr");
-    succeed(btf().arg("enlarge").args([fixture().model(), whole.clone()]).args(["--size", "700x530"]));
+    succeed(btf().arg("enlarge").args([store(".model.zarr"), whole.clone()]).args(["--size", "700x530"]));
     assert_same(&store(".enlarged.zarr"), &whole);
     assert!(store(".dzi").is_file() && store(".html").is_file());
     succeed(&mut Command::new(jobs.join("status.sh")));
@@ -254,8 +254,13 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
     succeed(&mut slurm(&[&archive], &jobs, &[]));
     let told = fail(&mut slurm(&[&archive], &jobs, &["--clusters", "9"]), 65);
     assert!(told.contains("settings.sh") && told.contains("--out") && told.contains("--force"), "{told}");
-    let told = fail(slurm(&[&archive], &jobs, &["--submit"]).env("PATH", "/nowhere:/bin:/usr/bin"), 66);
-    assert!(told.contains("no sbatch") || Path::new("/usr/bin/sbatch").exists(), "{told}");
+    let told = fail(Command::new("/bin/bash").arg(jobs.join("submit.sh")).env("PATH", "/nowhere"), 66);
+    assert!(told.contains("no sbatch here"), "{told}");
+    // What sbatch refuses is told.
+    let stubs = Stubs::new();
+    stubs.program("sbatch", "echo 'no such partition' >&2; exit 1");
+    let told = fail(&mut stubs.with(slurm(&[&archive], &jobs, &["--submit"])), 74);
+    assert!(told.contains("no such partition") && told.contains("not all were submitted"), "{told}");
 }
 
 #[test]

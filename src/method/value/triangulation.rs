@@ -15,7 +15,7 @@ const NEGLIGIBLE_WEIGHT: f64 = 1e-9;
 /// Stereographic projection from the nadir maps circles to circles, so the planar Delaunay
 /// triangulation of the projections is the spherical one. Fewer than three directions, or
 /// directions on one arc, have none.
-pub(crate) fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
+pub fn triangulate(directions: &[Direction]) -> Vec<[u16; 3]> {
     let points: Vec<Point> = directions
         .iter()
         .map(|direction| {
@@ -60,7 +60,11 @@ impl Interpolator {
     /// The mix that stands for `direction`: barycentric within a triangle, at the border for its
     /// azimuth beyond the outer ring, else (no triangles, or none on that side) the nearest direction.
     pub(crate) fn mix(&self, direction: Direction) -> Mix {
-        let target = direction.vector();
+        self.mix_of(direction.vector())
+    }
+
+    /// The same of a unit vector.
+    pub(super) fn mix_of(&self, target: [f64; 3]) -> Mix {
         let nearest = self.nearest(target);
         let exact = |number| Mix { terms: vec![(number, 1.0)], cosine_ratio: 1.0 };
         let offset: [f64; 3] = std::array::from_fn(|axis| self.vectors[nearest][axis] - target[axis]);
@@ -107,7 +111,7 @@ impl Interpolator {
     }
 
     /// Weights w with w0 a + w1 b + w2 c = target, or none where the corners lie in one plane.
-    fn barycentric(&self, [a, b, c]: [usize; 3], target: [f64; 3]) -> Option<[f64; 3]> {
+    pub(super) fn barycentric(&self, [a, b, c]: [usize; 3], target: [f64; 3]) -> Option<[f64; 3]> {
         let [a, b, c] = [self.vectors[a], self.vectors[b], self.vectors[c]];
         let volume = dot(a, cross(b, c));
         (volume.abs() > 1e-12).then(|| {
@@ -121,8 +125,20 @@ impl Interpolator {
 
     /// Mix of the two ends of the border edge that the meridian of `target` crosses: its elevation is clamped.
     fn at_border(&self, target: [f64; 3]) -> Option<Mix> {
+        let (terms, cosine_ratio) = self.crossing(target, self.border.iter().copied())?;
+        Some(Mix { terms: shares(terms), cosine_ratio })
+    }
+
+    /// Where the meridian of `target` crosses some border edges: the two ends of the one that it crosses nearest to the
+    /// target with their weights, and the cosine ratio of a [`Mix`].
+    #[inline]
+    pub(super) fn crossing(
+        &self,
+        target: [f64; 3],
+        edges: impl Iterator<Item = [usize; 2]>,
+    ) -> Option<([(usize, f64); 2], f64)> {
         let across_meridian = [-target[1], target[0], 0.0];
-        let crossing = |&[i, j]: &[usize; 2]| {
+        let crossing = |[i, j]: [usize; 2]| {
             let (at_i, at_j) = (dot(across_meridian, self.vectors[i]), dot(across_meridian, self.vectors[j]));
             if at_i * at_j > 0.0 || at_i == at_j {
                 return None;
@@ -133,10 +149,25 @@ impl Interpolator {
             let ahead = point[0] * target[0] + point[1] * target[1] > 0.0;
             ahead.then(|| (dot(point, target) / dot(point, point).sqrt(), point, [(i, wi), (j, wj)]))
         };
-        let (_, point, terms) = self.border.iter().filter_map(crossing).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (_, point, terms) = edges.filter_map(crossing).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let cosine = point[2] / dot(point, point).sqrt();
-        let cosine_ratio = (target[2] / cosine).clamp(0.0, 1.0);
-        Some(Mix { terms: shares(terms), cosine_ratio })
+        Some((terms, (target[2] / cosine).clamp(0.0, 1.0)))
+    }
+
+    /// The directions as unit vectors.
+    pub(super) fn vectors(&self) -> &[[f64; 3]] {
+        &self.vectors
+    }
+
+    /// Triangles of directions, without those whose corners lie in one plane with the centre.
+    pub(super) fn facets(&self) -> impl Iterator<Item = [usize; 3]> + '_ {
+        let solid = |corners: &[usize; 3]| self.barycentric(*corners, [0.0, 0.0, 1.0]).is_some();
+        self.triangles.iter().copied().filter(solid)
+    }
+
+    /// Edges that belong to one triangle only.
+    pub(super) fn border(&self) -> &[[usize; 2]] {
+        &self.border
     }
 }
 
@@ -164,11 +195,11 @@ fn least(weights: &[f64; 3]) -> f64 {
     weights.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

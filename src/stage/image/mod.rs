@@ -20,7 +20,7 @@ use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
-use crate::store::model::Model;
+use crate::store::model::{Model, Stage};
 use btfkit_formats::{Direction, Samples};
 pub(crate) use find::{model_of, of_stage};
 use scene::MEASUREMENT_ROWS;
@@ -66,9 +66,11 @@ pub struct Options {
 /// Where the values of texels come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Values {
-    /// The representatives of the clusters.
+    /// The representatives of the clusters; the components of a model that has no clusters.
     #[default]
     Model,
+    /// The components of the model.
+    Components,
     /// The measurement itself, through the source of each texel; where it is not named, it lies beside the model.
     Measured(Option<PathBuf>),
 }
@@ -264,11 +266,7 @@ pub fn of_measured_tile(
 
 /// Linear RGB of every cluster of a model under a light, seen from a view.
 pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Result<Vec<[f32; 3]>> {
-    let [views, lights] = model.directions()?;
-    let [view_triangles, light_triangles] = model.triangles()?;
-    let (views, lights) =
-        (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
-    let appearance = Appearance::new(&views, &lights, view, light);
+    let appearance = appearance_of(model, view, light)?;
     let mut colors = Vec::new();
     for clusters in model.representative_chunks()? {
         let representatives = model.representatives_of(clusters)?;
@@ -276,6 +274,34 @@ pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Resul
         colors.extend(appearance.of_brdfs(&representatives.samples, representatives.shape, &decoder));
     }
     Ok(colors)
+}
+
+/// The tile of a model under a light, seen from a view, by its components.
+///
+/// # Errors
+/// A model without components, and too little memory.
+pub fn of_components(
+    model: &Model,
+    view: Direction,
+    light: Direction,
+    context: &Context<'_>,
+) -> Result<Picture> {
+    of_stage(model, Stage::Components, |model| {
+        context.require("a picture by components", model.components_bytes()?)?;
+        let components = model.components()?;
+        let appearance = appearance_of(model, view, light)?;
+        let colors = context.install(|| components.colors(&appearance))?;
+        Ok(Picture::linear(components.size, colors))
+    })
+}
+
+/// How the values of a model are mixed under a light, seen from a view.
+fn appearance_of(model: &Model, view: Direction, light: Direction) -> Result<Appearance> {
+    let [views, lights] = model.directions()?;
+    let [view_triangles, light_triangles] = model.triangles()?;
+    let (views, lights) =
+        (Interpolator::new(&views, &view_triangles), Interpolator::new(&lights, &light_triangles));
+    Ok(Appearance::new(&views, &lights, view, light))
 }
 
 /// Looks up the colour of each texel's cluster.

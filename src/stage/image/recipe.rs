@@ -20,6 +20,18 @@ pub enum SceneRecipe {
     Enlarged(Stored),
     /// An endless plane of a model.
     Plane(Endless),
+    /// The tile of a packed model.
+    Packed(Packed),
+}
+
+/// The tile of a packed model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Packed {
+    /// Digest of the file.
+    pub digest: String,
+    /// The part that is shown: x, y, width, height.
+    pub window: [i64; 4],
 }
 
 /// A plane that is stored.
@@ -51,17 +63,32 @@ pub struct Endless {
     /// The part that is shown: x, y, width, height.
     pub window: [i64; 4],
     /// Where values come from.
-    pub values: ValuesName,
+    pub values: PlaneValues,
+    /// Digest of the components, where values are theirs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub components: Option<String>,
 }
 
-/// Where the values of texels come from.
+/// Where the values of texels of a plane come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum ValuesName {
+pub enum PlaneValues {
     /// The representatives of the clusters.
     Model,
     /// The measurement.
     Measured,
+    /// The components.
+    Components,
+}
+
+/// Where the values of texels come from, where it is not the model.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ValuesName {
+    /// The measurement.
+    Measured,
+    /// The components of this digest.
+    Components(Option<String>),
 }
 
 /// A part of a plane: x, y, width, height.
@@ -83,6 +110,7 @@ impl SceneRecipe {
                 return Err(format!("source: jitter: got {}, expected 0 to {JITTER_ONE}", plane.jitter));
             }
             Self::Plane(plane) => (Some(plane.window), None),
+            Self::Packed(packed) => (Some(packed.window), None),
         };
         let [height, width] = match (window, stored) {
             (Some([_, _, width, height]), _) => {

@@ -4,6 +4,7 @@ use super::report::{OLDEST_NOTE, Report, consolidated};
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::store::model::components::ComponentsReport;
 use crate::store::model::{KIND, Model, Stage};
 use crate::words::counted;
 use crate::zarr::metadata::OLDEST_FORMAT;
@@ -12,7 +13,7 @@ use crate::zarr::metadata::OLDEST_FORMAT;
 pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
     let mut report = Report::new(KIND);
     context.progress.begin("verify", Stage::ALL.len() as u64, Counted::Items("stages"));
-    for stage in Stage::ALL {
+    for stage in Stage::ALL.into_iter().chain(Stage::OPTIONAL) {
         context.check_stop()?;
         if model.has(stage)? {
             let before = report.findings.len();
@@ -20,7 +21,7 @@ pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
             context.install(|| of_stage(model, stage, context, &mut report))?;
             let found = report.findings.len() - before;
             report.checked(stage.name(), if found == 0 { "whole" } else { "damaged" });
-        } else {
+        } else if !Stage::OPTIONAL.contains(&stage) {
             report.checked(stage.name(), "not run");
         }
         context.progress.advance(1);
@@ -84,6 +85,14 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
         }
         Stage::Appearance => {
             report.keep("appearance", model.appearance())?;
+        }
+        Stage::Components => {
+            report.keep("report of components", model.report::<ComponentsReport>(stage))?;
+            if model.has_arrays(stage)? {
+                let bytes = model.components_bytes()?;
+                context.require("verifying components", bytes)?;
+            }
+            report.keep("components", model.components())?;
         }
     }
     Ok(())

@@ -3,7 +3,7 @@
 use super::appearance::{self, AppearanceReport};
 use super::entries::Entry;
 use super::normals::normals_layout;
-use super::{Model, Stage, clusters, field, tile};
+use super::{Model, Stage, clusters, components, field, tile};
 use crate::error::{Error, Result};
 use crate::zarr::checksums::DIGITS;
 use crate::zarr::{Array, DAMAGED, Layout, Named};
@@ -28,6 +28,7 @@ impl Model {
                 let report: AppearanceReport = self.typed(stage, report)?;
                 appearance::arrays(&report, self.clusters()?)
             }
+            Stage::Components => components::arrays(&self.components_shape(&self.typed(stage, report)?)?),
         })
     }
 
@@ -45,9 +46,7 @@ impl Model {
         layout: &Layout<'_>,
     ) -> Result<Array> {
         let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
-            crate::error::ErrorKind::Missing => {
-                error.hint(format!("run `btf {}` (or `btf model`) on it again", stage.name()))
-            }
+            crate::error::ErrorKind::Missing => error.hint(format!("run {} on it again", stage.commands())),
             _ => error,
         })?;
         let Some(kept) = &entry.checksums else { return Ok(array) };

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::appearance::AppearanceRecipe;
 use super::clusters::{ClusterRecipe, TakenRecipe};
+use super::components::ComponentsRecipe;
 use super::field::FitRecipe;
 use super::normals::NormalsRecipe;
 use super::tile::TileRecipe;
@@ -79,7 +80,7 @@ impl Model {
     pub(super) fn done(&self, stage: Stage) -> Result<Entry> {
         self.seen(stage)?.ok_or_else(|| {
             Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
-                .hint(format!("run `btf {}` (or `btf model`) on it first", stage.name()))
+                .hint(format!("run {} on it first", stage.commands()))
         })
     }
 
@@ -150,6 +151,7 @@ impl Model {
             Stage::Normals => Some(self.recipe::<NormalsRecipe>(stage)?.tile),
             Stage::Fit => Some(self.recipe::<FitRecipe>(stage)?.normals),
             Stage::Appearance => Some(self.recipe::<AppearanceRecipe>(stage)?.cluster),
+            Stage::Components => Some(self.recipe::<ComponentsRecipe>(stage)?.tile),
         })
     }
 

@@ -1,12 +1,13 @@
 //! The model store: what the analysis of a measurement leaves, everything an evaluator needs.
 //!
-//! Each stage (`tile`, `cluster`, `normals`, `fit`, `appearance`) writes its arrays and then, last, its entry in
+//! Each stage (`tile`, `cluster`, `normals`, `fit`, `appearance`, `components`) writes its arrays and then, last, its entry in
 //! the attributes: arrays without their entry are the remains of a run that was killed. A stage has a file here with
 //! its recipe, its report, its arrays, and the checks that reading them needs.
 
 pub mod appearance;
 mod arrays;
 pub mod clusters;
+pub mod components;
 mod entries;
 pub mod field;
 pub mod normals;

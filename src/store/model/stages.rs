@@ -16,6 +16,8 @@ pub enum Stage {
     Fit,
     /// How the exemplar looks, for the coherent rule.
     Appearance,
+    /// The mean and principal components of all samples: a model of values beside the clusters.
+    Components,
 }
 
 impl Stage {
@@ -27,27 +29,37 @@ impl Stage {
             Self::Normals => "normals",
             Self::Fit => "fit",
             Self::Appearance => "appearance",
+            Self::Components => "components",
         }
     }
 
-    /// All of them, in the order of the data flow.
+    /// Those that `btf model` runs, in the order of the data flow.
     pub const ALL: [Self; 5] = [Self::Tile, Self::Cluster, Self::Normals, Self::Fit, Self::Appearance];
+
+    /// Those that are run by themselves only.
+    pub const OPTIONAL: [Self; 1] = [Self::Components];
 
     /// The stages that build on it, directly or not, in the order of the data flow.
     pub(super) fn builders(self) -> &'static [Self] {
         match self {
-            Self::Tile => &[Self::Cluster, Self::Normals, Self::Fit, Self::Appearance],
+            Self::Tile => &[Self::Cluster, Self::Normals, Self::Fit, Self::Appearance, Self::Components],
             Self::Cluster => &[Self::Appearance],
             Self::Normals => &[Self::Fit],
-            Self::Fit | Self::Appearance => &[],
+            Self::Fit | Self::Appearance | Self::Components => &[],
         }
+    }
+
+    /// The commands that run it, for advice.
+    pub(super) fn commands(self) -> String {
+        let also = if Self::OPTIONAL.contains(&self) { "" } else { " (or `btf model`)" };
+        format!("`btf {}`{also}", self.name())
     }
 
     /// The stage that it works on the result of.
     pub fn input(self) -> Option<Self> {
         match self {
             Self::Tile => None,
-            Self::Cluster | Self::Normals => Some(Self::Tile),
+            Self::Cluster | Self::Normals | Self::Components => Some(Self::Tile),
             Self::Fit => Some(Self::Normals),
             Self::Appearance => Some(Self::Cluster),
         }

@@ -1,7 +1,7 @@
 #!/bin/bash
 # Submits the jobs of this folder; each waits for those whose results it reads. Run it again whenever jobs were lost or
 # failed: what is done is found done within seconds, and two runs at once do no harm.
-set -eEo pipefail
+set -eo pipefail
 case $0 in */*) cd -- "${0%/*}" ;; esac
 . ./settings.sh
 command -v sbatch >/dev/null || {
@@ -11,7 +11,7 @@ command -v sbatch >/dev/null || {
 mkdir -p logs
 unset BTF_MATERIAL BTF_PASS
 : >jobs
-trap 'echo "submit.sh: not all jobs were submitted; to cancel those that were: scancel \$(cat $(printf %q "$PWD/jobs"))" >&2' ERR
+trap '[ $? = 0 ] || echo "submit.sh: not all were submitted; to cancel those that were: scancel \$(cat $(printf %q "$PWD/jobs"))" >&2' EXIT
 
 # Submits a script as an array of so many tasks, after the job before it. `last` is that job; `waits` is afterok (for
 # all of its tasks) or aftercorr (task by task, for the one of the same material).

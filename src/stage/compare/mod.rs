@@ -1,4 +1,7 @@
-//! Model against measurement: how well the tile is reconstructed from its index and representatives.
+//! Model against measurement: how well the tile is reconstructed from its index and representatives, or from its
+//! components.
+
+mod modelled;
 
 use std::path::PathBuf;
 
@@ -13,10 +16,11 @@ use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
-use crate::stage::image::of_stage;
 use crate::store::measurement::Measurement;
-use crate::store::model::{Model, Representatives, Stage};
+use crate::store::model::{Model, Stage};
 use crate::words::counted;
+pub use modelled::By;
+use modelled::Modelled;
 
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
@@ -199,9 +203,9 @@ pub struct Shared {
 ///
 /// # Errors
 /// Those of reading, and too little memory.
-pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> Result<Report> {
+pub fn run(model: &Model, measurement: &Measurement, by: By, context: &Context<'_>) -> Result<Report> {
     let views: Vec<usize> = (0..measurement.description().views.len()).collect();
-    let comparison = Comparison::open(model, measurement)?;
+    let comparison = Comparison::open(model, measurement, by, context)?;
     let sums = comparison.sums(&views, context, |_, _| Ok(()))?;
     Ok(comparison.report(&sums))
 }
@@ -214,17 +218,18 @@ pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> R
 pub fn run_shared(
     model: &Model,
     measurement: &Measurement,
+    by: By,
     sharing: &Sharing,
     context: &Context<'_>,
 ) -> Result<Shared> {
     let n_views = measurement.description().views.len();
     let what = json!({
         "stage": "compare", "method": METHOD, "measurement": measurement.digest(),
-        "model": model.digest_of(&[Stage::Tile, Stage::Cluster])?,
+        "model": model.digest_of(&[Stage::Tile, by.stage()])?,
     });
     let partial = Partial::at(&sharing.folder, &what)?;
     let kept = || (0..n_views).map(|view| partial.read::<Sums>(view)).collect::<Vec<_>>();
-    let comparison = Comparison::open(model, measurement)?;
+    let comparison = Comparison::open(model, measurement, by, context)?;
     if let Some(shard) = sharing.shard {
         let found = kept();
         let missing: Vec<usize> =
@@ -252,19 +257,17 @@ struct Comparison<'a> {
     bounds: Window,
     /// Texels of the tile, within the bounds.
     offsets: Vec<usize>,
-    index: Vec<u16>,
-    representatives: Representatives,
+    modelled: Modelled,
     /// Of so many texels one's colours are compared.
     stride: usize,
 }
 
 impl<'a> Comparison<'a> {
-    fn open(model: &Model, measurement: &'a Measurement) -> Result<Self> {
-        let (tile, index) = (model.tile()?, of_stage(model, Stage::Cluster, Model::index)?);
-        let representatives = of_stage(model, Stage::Cluster, Model::representatives)?;
+    fn open(model: &Model, measurement: &'a Measurement, by: By, context: &Context<'_>) -> Result<Self> {
+        let (tile, modelled) = (model.tile()?, Modelled::open(model, by, context)?);
         let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
         let stride = offsets.len().div_ceil(COLOUR_TEXELS);
-        Ok(Self { measurement, bounds, offsets, index, representatives, stride })
+        Ok(Self { measurement, bounds, offsets, modelled, stride })
     }
 
     /// Compares these views; each one's sums are handed to `keep`.
@@ -274,9 +277,10 @@ impl<'a> Comparison<'a> {
         context: &Context<'_>,
         keep: impl Fn(usize, &Sums) -> Result<()> + Sync,
     ) -> Result<Vec<Sums>> {
-        let texel_bytes = self.measurement.description().texel_bytes();
+        let description = self.measurement.description();
+        let texel_bytes = 2 * description.texel_bytes() + self.modelled.bytes_of_texel(description);
         context.progress.begin("compare", views.len() as u64, Counted::Items("views"));
-        let window_bytes = 2 * (self.bounds.size.texels() * texel_bytes) as u64;
+        let window_bytes = (self.bounds.size.texels() * texel_bytes) as u64;
         let what = format!("comparing views of {}", self.bounds.size);
         let in_flight = units::in_flight(context, &what, window_bytes)?;
         let sums = units::for_each(context, views, in_flight, |&view| {
@@ -293,19 +297,18 @@ impl<'a> Comparison<'a> {
         let description = self.measurement.description();
         let (texel, channels) = (description.texel_samples(), description.n_channels());
         let (decoder, codes) = (description.decoder()?, description.codes()?);
-        let modelled_samples = &self.representatives.samples;
+        let (modelled_samples, starts) = self.modelled.of_view(view, description);
         let window = self.measurement.read_reflectance(view, self.bounds)?;
         let mut sums = Sums { views: 1, ..Sums::default() };
         let difference = |measured: usize, modelled: usize| {
             let [a, b] = [window.value(measured), modelled_samples.value(modelled)];
             Some(a? - b?).filter(|difference| difference.is_finite())
         };
-        for (number, (&at, &cluster)) in self.offsets.iter().zip(&self.index).enumerate() {
-            let start = (usize::from(cluster) * description.views.len() + view) * texel;
+        for (number, (&at, &start)) in self.offsets.iter().zip(&starts).enumerate() {
             for sample in (0..texel).step_by(channels) {
                 let (measured, modelled) = (at * texel + sample, start + sample);
                 let code = codes.code(&window, measured);
-                sums.codes += u64::from(code.abs_diff(codes.code(modelled_samples, modelled)));
+                sums.codes += u64::from(code.abs_diff(codes.code(&modelled_samples, modelled)));
                 for channel in 0..channels {
                     match difference(measured + channel, modelled + channel) {
                         Some(difference) => sums.squares += difference * difference,
@@ -313,7 +316,7 @@ impl<'a> Comparison<'a> {
                     }
                 }
                 if number % self.stride == 0 {
-                    let [a, b] = [decoder.rgb(&window, measured), decoder.rgb(modelled_samples, modelled)];
+                    let [a, b] = [decoder.rgb(&window, measured), decoder.rgb(&modelled_samples, modelled)];
                     sums.add_colour(ciede2000(lab(a), lab(b)));
                 }
             }

@@ -1,0 +1,28 @@
+//! The rotation of the channels: brightness apart from colour.
+
+/// An orthonormal matrix [new channel][channel]. Three channels take the fixed rotation (1, 1, 1) / sqrt 3,
+/// (1, 0, -1) / sqrt 2, (1, -2, 1) / sqrt 6, which is the DCT of length 3 up to signs; any other number takes its DCT.
+pub(crate) fn rotation(count: usize) -> Vec<Vec<f64>> {
+    let row = |frequency: usize| -> Vec<f64> {
+        let scale = ((if frequency == 0 { 1.0 } else { 2.0 }) / count as f64).sqrt();
+        let angle =
+            |place: usize| core::f64::consts::PI * ((2 * place + 1) * frequency) as f64 / (2 * count) as f64;
+        (0..count).map(|place| scale * libm::cos(angle(place))).collect()
+    };
+    (0..count).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_channels_are_rotated_to_brightness_and_two_differences() {
+        let expected = [[1.0, 1.0, 1.0], [1.0, 0.0, -1.0], [1.0, -2.0, 1.0]];
+        for (row, expected) in rotation(3).iter().zip(expected) {
+            let norm = expected.iter().map(|v: &f64| v * v).sum::<f64>().sqrt();
+            assert!(row.iter().zip(expected).all(|(a, b)| (a - b / norm).abs() < 1e-12));
+        }
+        assert_eq!(rotation(1), [[1.0]]);
+    }
+}

@@ -1,0 +1,125 @@
+//! The curve on which principal components are found: the sRGB curve times 255, whatever the samples are.
+//!
+//! Squared errors on it are as visible in the dark as in the light, which they are not in linear light. It goes on above
+//! white and is straight below black, so that high dynamic range keeps its order. Samples that are not finite are 0.
+
+use std::ops::Range;
+
+use btfkit_formats::{SampleType, Samples, f16};
+
+use super::{Transfer, srgb_decode};
+
+/// White on the curve.
+pub(crate) const WHITE: f32 = 255.0;
+
+/// The largest value, in both directions: 65 thousand times as bright as white is no reflectance, and sums of products
+/// must stay finite.
+const LARGEST: f32 = (1 << 24) as f32;
+
+/// From samples to the curve.
+pub(crate) struct Curve {
+    /// The value of each sample, of those types whose samples are few.
+    table: Vec<f32>,
+    transfer: Transfer,
+}
+
+impl Curve {
+    pub(crate) fn new(sample_type: SampleType, transfer: Transfer) -> Self {
+        let table = match sample_type {
+            SampleType::U8 => (0..=u8::MAX).map(|code| on_curve(f64::from(code) / 255.0, transfer)).collect(),
+            SampleType::U16 => {
+                (0..=u16::MAX).map(|code| on_curve(f64::from(code) / 65535.0, transfer)).collect()
+            }
+            SampleType::F16 => {
+                (0..=u16::MAX).map(|bits| on_curve(f16::from_bits(bits).to_f64(), transfer)).collect()
+            }
+            SampleType::F32 => vec![],
+        };
+        Self { table, transfer }
+    }
+
+    /// Values of a run of samples.
+    pub(crate) fn values(&self, samples: &Samples, range: Range<usize>, to: &mut [f32]) {
+        match samples {
+            Samples::U8(list) => {
+                to.iter_mut().zip(&list[range]).for_each(|(to, &code)| *to = self.table[usize::from(code)]);
+            }
+            Samples::U16(list) => {
+                to.iter_mut().zip(&list[range]).for_each(|(to, &code)| *to = self.table[usize::from(code)]);
+            }
+            Samples::F16(list) => {
+                let of = |sample: f16| self.table[usize::from(sample.to_bits())];
+                to.iter_mut().zip(&list[range]).for_each(|(to, &sample)| *to = of(sample));
+            }
+            Samples::F32(list) => {
+                let of = |sample: f32| on_curve(f64::from(sample), self.transfer);
+                to.iter_mut().zip(&list[range]).for_each(|(to, &sample)| *to = of(sample));
+            }
+        }
+    }
+}
+
+fn on_curve(sample: f64, transfer: Transfer) -> f32 {
+    let value = match transfer {
+        Transfer::Srgb => sample,
+        Transfer::Linear => Transfer::Srgb.encode(sample),
+    };
+    let value = (f64::from(WHITE) * value) as f32;
+    if value.is_finite() { value.clamp(-LARGEST, LARGEST) } else { 0.0 }
+}
+
+/// Values as samples of a type: rounded, and within what it holds.
+pub(crate) fn samples(values: &[f32], sample_type: SampleType, transfer: Transfer) -> Samples {
+    let scaled = |value: &f32| {
+        let value = f64::from(*value) / f64::from(WHITE);
+        match transfer {
+            Transfer::Srgb => value,
+            Transfer::Linear => srgb_decode(value),
+        }
+    };
+    let whole = |value: &f32, most: f64| (scaled(value).clamp(0.0, 1.0) * most).round();
+    match sample_type {
+        SampleType::U8 => Samples::U8(values.iter().map(|value| whole(value, 255.0) as u8).collect()),
+        SampleType::U16 => Samples::U16(values.iter().map(|value| whole(value, 65535.0) as u16).collect()),
+        SampleType::F16 => Samples::F16(values.iter().map(|value| f16::from_f64(scaled(value))).collect()),
+        SampleType::F32 => Samples::F32(values.iter().map(|value| scaled(value) as f32).collect()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_of_every_type_and_curve_come_back_from_it() {
+        let halves: Vec<f16> = [-0.25f32, 0.0, 0.1, 1.0, 7.5].map(f16::from_f32).to_vec();
+        for (given, near) in [
+            (Samples::U8((0..=255).collect()), 0.0),
+            (Samples::U16((0..1000).map(|n| n * 65).collect()), 1e-9),
+            (Samples::F16(halves), 1e-9),
+            (Samples::F32(vec![-0.25, 0.0, 1e-3, 1.0, 40.0]), 1e-5),
+        ] {
+            for transfer in [Transfer::Srgb, Transfer::Linear] {
+                let mut values = vec![0.0; given.len()];
+                Curve::new(given.sample_type(), transfer).values(&given, 0..given.len(), &mut values);
+                assert!(values.is_sorted());
+                let back = samples(&values, given.sample_type(), transfer);
+                for at in 0..given.len() {
+                    let (a, b) = (given.value(at), back.value(at));
+                    assert!(
+                        a.zip(b).is_some_and(|(a, b)| (a - b).abs() <= near * a.abs().max(1.0)),
+                        "{a:?} {b:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_black() {
+        let mut values = [1.0; 4];
+        let given = Samples::F32(vec![f32::NAN, f32::INFINITY, 0.5, -3e30]);
+        Curve::new(SampleType::F32, Transfer::Srgb).values(&given, 0..4, &mut values);
+        assert_eq!(values, [0.0, 0.0, 127.5, -LARGEST]);
+    }
+}

@@ -1,0 +1,432 @@
+//! Components to one small file and back; see [`btfkit_packed`].
+
+use std::path::{Path, PathBuf};
+
+use btfkit_formats::{Angles, Direction};
+use btfkit_packed as packed;
+use serde::Serialize;
+
+use crate::color::Transfer;
+use crate::disk::mapped::MappedFile;
+use crate::disk::output::{self, Made};
+use crate::error::{Error, Result};
+use crate::lattice::Lattice;
+use crate::method::tile::Tile;
+use crate::method::value::components::Components;
+use crate::names::ends_with;
+use crate::run::Context;
+use crate::run::recipe::{self, Recipe};
+use crate::shape::Size;
+use crate::stage::components::Report as ComponentsReport;
+use crate::stage::image::of_stage;
+use crate::store::measurement::Description;
+use crate::store::model::components::{ComponentsRecipe, Found};
+use crate::store::model::tile::{TileRecipe, TileReport};
+use crate::store::model::{Model, Stage};
+use crate::zarr::samples_named;
+
+/// Ending of a packed model's name.
+pub const ENDING: &str = ".btfc";
+
+/// How small, or how good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Quality {
+    /// At most so many bytes.
+    Bytes(u64),
+    /// So many times smaller than the samples of the tile.
+    Ratio(f64),
+    /// At least this peak signal-to-noise ratio, dB.
+    Decibels(f64),
+}
+
+/// What to pack.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The model with components.
+    pub model: PathBuf,
+    /// The file.
+    pub output: PathBuf,
+    /// How small or how good.
+    pub quality: Quality,
+    /// Under which licence the material may be used.
+    pub licence: Option<String>,
+    /// Millimetres of a texel.
+    pub texel_mm: Option<f64>,
+}
+
+/// What was packed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Packed {
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Bytes of the tile's samples.
+    pub tile_bytes: u64,
+    /// Components in it.
+    pub components: usize,
+    /// Components of the model.
+    pub components_of_model: usize,
+    /// Peak signal-to-noise ratio to the samples, dB.
+    pub psnr_db: f64,
+    /// Whether it was there already.
+    #[serde(skip)]
+    pub made: Option<Made>,
+}
+
+/// Names of texts in a packed model.
+const SAMPLES: &str = "samples";
+const TRANSFER: &str = "transfer";
+const MEASUREMENT: &str = "measurement";
+const LICENCE: &str = "licence";
+const TEXEL_MM: &str = "texel_mm";
+
+/// The curve's name in a packed model.
+fn transfer_name(transfer: Transfer) -> &'static str {
+    match transfer {
+        Transfer::Srgb => "srgb",
+        Transfer::Linear => "linear",
+    }
+}
+
+/// What the packer found, as an error of this program.
+fn of_packed(path: &Path, error: &packed::Error) -> Error {
+    Error::input(format!("{}: {error}", path.display()))
+}
+
+/// Packs the components of a model.
+///
+/// # Errors
+/// A model without components, a quality that cannot be had, a size that the format does not hold, and those of
+/// writing.
+pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
+    output::expect_outside_stores(&options.output)?;
+    if !ends_with(&options.output, ENDING) {
+        let name = options.output.display();
+        return Err(Error::usage(format!("{name}: expected a name that ends with {ENDING}")));
+    }
+    let model = Model::open(&options.model)?;
+    let report: ComponentsReport =
+        of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
+    // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
+    context.require("packing components", 5 * model.components_bytes()?)?;
+    let whole = unpacked_model(&model, options)?;
+    let target = match options.quality {
+        Quality::Bytes(bytes) => packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
+        Quality::Ratio(ratio) => packed::Target::Bytes((report.tile_bytes as f64 / ratio) as usize),
+        Quality::Decibels(decibels) => packed::Target::Decibels(decibels),
+    };
+    context.check_stop()?;
+    let file = context
+        .compute(|| packed::pack(&whole, report.squared_error.unwrap_or(0.0), target))
+        .map_err(|error| Error::usage(format!("{}: {error}", options.model.display())))?;
+    let made = output::prepare_bytes(&options.output, context.existing, &file.bytes)?.publish()?;
+    Ok(Packed {
+        bytes: file.bytes.len() as u64,
+        tile_bytes: report.tile_bytes,
+        components: file.components,
+        components_of_model: report.components,
+        psnr_db: file.decibels,
+        made: Some(made),
+    })
+}
+
+/// The components of a model as the packer takes them.
+fn unpacked_model(model: &Model, options: &Options) -> Result<packed::Model> {
+    let components = model.components()?;
+    let tile: TileReport = model.tile_report()?;
+    let count = components.count();
+    let lists = |values: &[f32]| -> Vec<Vec<f64>> {
+        (0..count)
+            .map(|k| values.iter().skip(k).step_by(count).map(|&value| f64::from(value)).collect())
+            .collect()
+    };
+    let parts = lists(&components.basis).into_iter().zip(lists(&components.coefficients));
+    let [views, lights] = model.directions()?.map(|list| {
+        let degrees = |direction: &Direction| {
+            let (theta_deg, phi_deg) = direction.degrees();
+            packed::Direction { theta_deg, phi_deg }
+        };
+        list.iter().map(degrees).collect()
+    });
+    let mut texts = vec![(TRANSFER.to_owned(), transfer_name(tile.transfer).to_owned())];
+    texts.extend(tile.samples.iter().map(|name| (SAMPLES.to_owned(), name.clone())));
+    if tile.patch.is_none() {
+        // Of a tile that is the whole measurement it can be told again which texel is which.
+        texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
+    }
+    texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
+    texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
+    Ok(packed::Model {
+        size: tile.size,
+        wraps: tile.wraps,
+        views,
+        lights,
+        channels: components.channels,
+        texts,
+        mean: components.mean.iter().map(|&value| f64::from(value)).collect(),
+        components: parts.map(|(basis, coefficients)| packed::Component { basis, coefficients }).collect(),
+    })
+}
+
+/// A plane of a packed model, for people.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Plane {
+    /// Bytes up to its end: a file that is cut there is a model.
+    pub bytes: usize,
+    /// Components.
+    pub components: usize,
+    /// Peak signal-to-noise ratio, dB.
+    pub psnr_db: f64,
+}
+
+/// What a packed model holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct About {
+    /// What it is, for programs that read it.
+    pub kind: &'static str,
+    /// Columns and rows of the tile.
+    pub size: [usize; 2],
+    /// Whether its borders join.
+    pub wraps: bool,
+    /// Views and lights.
+    pub directions: [usize; 2],
+    /// Names of the channels.
+    pub channels: Vec<String>,
+    /// Bytes of the file.
+    pub bytes: usize,
+    /// Bytes of the tile's samples, where their type is said.
+    pub tile_bytes: Option<u64>,
+    /// What it can be cut to.
+    pub planes: Vec<Plane>,
+    /// What else is said.
+    pub texts: Vec<(String, String)>,
+    /// What is wrong with its end.
+    pub notes: Vec<String>,
+}
+
+/// Whether a file is a packed model, by its name or its first bytes.
+pub fn is_packed(path: &Path) -> bool {
+    path.is_file() && (ends_with(path, ENDING) || begins_so(path))
+}
+
+fn begins_so(path: &Path) -> bool {
+    MappedFile::open(path).is_ok_and(|file| file.as_ref().starts_with(&packed::MAGIC))
+}
+
+/// Reads a packed model.
+fn read(path: &Path) -> Result<(packed::Unpacked, String, usize)> {
+    let file = MappedFile::open(path).map_err(|error| Error::io("open", path, error))?;
+    let bytes: &[u8] = file.as_ref();
+    let unpacked = packed::unpack(bytes).map_err(|error| of_packed(path, &error))?;
+    Ok((unpacked, recipe::digest_bytes(bytes), bytes.len()))
+}
+
+/// What there is to say of the end of a packed model.
+fn notes(unpacked: &packed::Unpacked) -> Vec<String> {
+    let (there, all) = (unpacked.planes.len(), unpacked.sections);
+    match unpacked.ending {
+        packed::Ending::Whole => vec![],
+        packed::Ending::Cut(at) => {
+            vec![format!(
+                "the file was cut: {there} of {all} planes are there, up to byte {at}; it is coarser than it was"
+            )]
+        }
+        packed::Ending::Damaged(at) => vec![format!(
+            "the plane that begins at byte {at} is damaged: {there} of {all} planes are read; get the file anew for the rest"
+        )],
+    }
+}
+
+fn text<'a>(texts: &'a [(String, String)], name: &str) -> Option<&'a str> {
+    texts.iter().find(|(found, _)| found == name).map(|(_, text)| text.as_str())
+}
+
+/// What a packed model holds.
+///
+/// # Errors
+/// A file that is none, or is damaged before its first plane ends.
+pub fn about(path: &Path) -> Result<About> {
+    let (unpacked, _, bytes) = read(path)?;
+    let notes = notes(&unpacked);
+    let packed::Unpacked { model, planes, .. } = unpacked;
+    let values = (model.texels() * model.brdf()) as u64;
+    let plane = |plane: &packed::Plane| Plane {
+        bytes: plane.end,
+        components: plane.components,
+        psnr_db: plane.decibels,
+    };
+    Ok(About {
+        kind: "packed model",
+        size: [model.size[1], model.size[0]],
+        wraps: model.wraps,
+        directions: [model.views.len(), model.lights.len()],
+        bytes,
+        tile_bytes: text(&model.texts, SAMPLES)
+            .and_then(samples_named)
+            .map(|samples| samples.bytes() as u64 * values),
+        planes: planes.iter().map(plane).collect(),
+        channels: model.channels,
+        texts: model.texts,
+        notes,
+    })
+}
+
+/// A packed model, opened to be evaluated.
+pub(crate) struct Opened {
+    pub(crate) components: Components,
+    pub(crate) views: Vec<Direction>,
+    pub(crate) lights: Vec<Direction>,
+    /// Digest of the file.
+    pub(crate) digest: String,
+    /// What is wrong with its end.
+    pub(crate) notes: Vec<String>,
+}
+
+/// Opens a packed model to be evaluated.
+///
+/// # Errors
+/// A file that is none, or is damaged before its first plane ends; too little memory.
+pub(crate) fn open(path: &Path, context: &Context<'_>) -> Result<Opened> {
+    let (unpacked, digest, bytes) = read(path)?;
+    let notes = notes(&unpacked);
+    let from = unpacked.model;
+    context.require("a packed model", memory_bytes(&from, bytes))?;
+    let count = from.components.len();
+    let turned = |of: fn(&packed::Component) -> &Vec<f64>, length: usize| {
+        let mut all = vec![0.0; length * count];
+        for (number, part) in from.components.iter().enumerate() {
+            let places = all.iter_mut().skip(number).step_by(count);
+            places.zip(of(part)).for_each(|(to, &value)| *to = value as f32);
+        }
+        all
+    };
+    let [height, width] = from.size;
+    Ok(Opened {
+        components: Components {
+            size: Size::new(height, width),
+            brdf: [from.views.len(), from.lights.len()],
+            mean: from.mean.iter().map(|&value| value as f32).collect(),
+            basis: turned(|part| &part.basis, from.brdf()),
+            coefficients: turned(|part| &part.coefficients, from.texels()),
+            channels: from.channels.clone(),
+        },
+        views: directions(path, &from.views)?,
+        lights: directions(path, &from.lights)?,
+        digest,
+        notes,
+    })
+}
+
+/// Memory that a packed model takes in f64 and f32, beside its bytes.
+fn memory_bytes(model: &packed::Model, bytes: usize) -> u64 {
+    (bytes + 24 * (model.components.len() + 1) * (model.brdf() + model.texels())) as u64
+}
+
+/// Directions of a packed model.
+fn directions(file: &Path, list: &[packed::Direction]) -> Result<Vec<Direction>> {
+    let direction = |direction: &packed::Direction| {
+        let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
+        angles.map(Angles::direction).ok_or_else(|| {
+            let packed::Direction { theta_deg, phi_deg } = direction;
+            Error::input(format!(
+                "{}: got the direction theta {theta_deg}, phi {phi_deg}, which is none",
+                file.display()
+            ))
+        })
+    };
+    list.iter().map(direction).collect()
+}
+
+/// What was unpacked.
+#[derive(Clone, Debug)]
+pub struct Restored {
+    /// Rows and columns of the tile.
+    pub size: Size,
+    /// Components.
+    pub components: usize,
+    /// Whether it was found done.
+    pub found: bool,
+    /// What is wrong with the file's end.
+    pub notes: Vec<String>,
+}
+
+/// Makes a model of a packed one, with a tile and components.
+///
+/// # Errors
+/// A file that is none; a model there that is another; those of writing.
+pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restored> {
+    let (unpacked, digest, bytes) = read(file)?;
+    let notes = notes(&unpacked);
+    let psnr_db = unpacked.planes.last().map(|plane| plane.decibels).filter(|&decibels| decibels > 0.0);
+    let packed::Unpacked { model: from, .. } = unpacked;
+    let sample_type =
+        text(&from.texts, SAMPLES).and_then(samples_named).unwrap_or(btfkit_formats::SampleType::F32);
+    let transfer = match text(&from.texts, TRANSFER) {
+        Some("linear") => Transfer::Linear,
+        _ => Transfer::Srgb,
+    };
+    let [height, width] = from.size;
+    let size = Size::new(height, width);
+    let description = Description {
+        size,
+        channels: from.channels.clone(),
+        sample_type,
+        views: directions(file, &from.views)?,
+        lights: directions(file, &from.lights)?,
+        transfer,
+        white: 1.0,
+    };
+    // A model whose channels are not understood could not be shown.
+    description.decoder()?;
+    context.require("unpacking components", memory_bytes(&from, bytes))?;
+    let model = Model::create(path, context)?;
+    let named = text(&from.texts, MEASUREMENT).map_or_else(|| format!("packed:{digest}"), str::to_owned);
+    let tile = if from.wraps { "periodic" } else { "none" }.to_owned();
+    let tile_recipe = TileRecipe { measurement: named, tile, seed: 1, lattice: None }.to_value()?;
+    if let Some(_lock) = model.begin(Stage::Tile, &tile_recipe, context)? {
+        let report = TileReport {
+            size: from.size,
+            wraps: from.wraps,
+            patch: None,
+            seam_visibility: 1.0,
+            uncut_visibility: 1.0,
+            transfer,
+            channels: Some(from.channels.clone()),
+            samples: Some(sample_type.name().to_owned()),
+            measurement_size: from.size,
+            lattice: Lattice::default(),
+            cells: vec![],
+        };
+        model.write_directions(&description)?;
+        model.write_tile(&Tile::whole(size, from.wraps))?;
+        model.finish(Stage::Tile, &tile_recipe, &report, context)?;
+    }
+    let recipe = ComponentsRecipe {
+        tile: model.stage_digest(Stage::Tile)?,
+        components: from.components.len(),
+        seed: 1,
+        packed: Some(digest),
+    };
+    let recipe = recipe.to_value()?;
+    let components = from.components.len().max(1);
+    let done = |found: bool| Restored { size, components, found, notes: notes.clone() };
+    let Some(_lock) = model.begin(Stage::Components, &recipe, context)? else { return Ok(done(true)) };
+    let (mut bases, mut coefficients): (Vec<_>, Vec<_>) =
+        from.components.into_iter().map(|part| (part.basis, part.coefficients)).unzip();
+    if bases.is_empty() {
+        // A model of the mean alone: a component of nothing.
+        bases.push(vec![0.0; from.mean.len()]);
+        coefficients.push(vec![0.0; size.texels()]);
+    }
+    let mean = from.mean.iter().map(|&value| value as f32).collect();
+    model.write_components(&Found { mean, bases, coefficients })?;
+    let report = ComponentsReport {
+        components,
+        strengths: vec![],
+        squared_error: None,
+        psnr_db,
+        bytes: model.bytes_of_components(components)?,
+        tile_bytes: description.bytes(),
+    };
+    model.finish(Stage::Components, &recipe, &report, context)?;
+    Ok(done(false))
+}

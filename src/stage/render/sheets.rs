@@ -1,0 +1,217 @@
+//! Ways to cover an object with a material, side by side: the tile again and again, two tiles that join each other, the
+//! paper's rule with a 2D and a 3D random field, and the endless plane of the coherent rule (figures 10 and 11 of the
+//! paper).
+
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use super::{Options, Report, lights, material, objects};
+use crate::error::{Error, Result};
+use crate::kernel::Kernel;
+use crate::method::baseline::{Exemplar, Tiles};
+use crate::method::field::marginals::Matching;
+use crate::method::field::{self, Boundary, CarKind, Coordinates, Extent, Gains, Surface, Synthesis};
+use crate::method::index::nearest::NearestNormals;
+use crate::method::index::scan::{Neighbours, Scan};
+use crate::method::value::evaluator::Evaluator;
+use crate::picture::drawing::Canvas;
+use crate::picture::{Encoding, Picture};
+use crate::render::camera::Camera;
+use crate::render::texture::{Maker, Pieces, Texture};
+use crate::render::{Background, Scene};
+use crate::run::Context;
+use crate::run::progress::Counted;
+use crate::shape::{Area, Size};
+use crate::stage::fit;
+use crate::stage::image::{PlaneOptions, of_stage};
+use crate::store::model::{Model, Stage};
+
+/// Panels beside each other.
+const COLUMNS: usize = 3;
+
+/// Pixels around panels.
+const MARGIN: usize = 12;
+
+/// Height of a line of text.
+const LINE: usize = 16;
+
+/// Candidates of the paper's rule.
+const CANDIDATES: usize = 16;
+
+/// Side of the planes that the paper's rule makes: what the objects have of texture at scale 1.
+const PAPER_SIDE: f64 = 1024.0;
+
+/// Seed of all that is drawn.
+const SEED: u64 = 1;
+
+/// What is opened once for all panels.
+struct Subject<'a> {
+    model: Model,
+    evaluator: Evaluator,
+    options: &'a Options,
+    context: &'a Context<'a>,
+}
+
+/// Shows the material on the object by each way, on one sheet with labels; a way that the model has nothing for is left
+/// out, and a note says why.
+///
+/// # Errors
+/// As [`super::run`], and where no way is possible.
+pub fn compare(
+    options: &Options,
+    output: &Path,
+    encoding: Encoding,
+    context: &Context<'_>,
+) -> Result<Report> {
+    let Size { height, width } = options.size;
+    let rows = 2;
+    let sheet = Size::new(rows * (height + LINE + MARGIN) + MARGIN, COLUMNS * (width + MARGIN) + MARGIN);
+    encoding.check_size(sheet)?;
+    let pixels = (sheet.texels() as u64) * super::PIXEL_BYTES + encoding.memory_bytes(sheet);
+    context.require(&format!("a sheet of {sheet}"), pixels)?;
+    let model = Model::open(&options.source)?;
+    let (evaluator, mut notes) = material::evaluator(&model, pixels, context)?;
+    let subject = Subject { model, evaluator, options, context };
+    type Way<'a> = (&'static str, Box<dyn Fn() -> Result<Texture> + 'a>);
+    let ways: [Way<'_>; 5] = [
+        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.model, Some(true))?.0))),
+        ("two tiles", Box::new(|| subject.two_tiles())),
+        ("paper, 2D CAR", Box::new(|| subject.paper(CarKind::Car2d))),
+        ("paper, 3D CAR", Box::new(|| subject.paper(CarKind::Car3d))),
+        (
+            "coherent",
+            Box::new(|| {
+                let which = options.plane.unwrap_or(PlaneOptions { seed: SEED as u32, jitter: None });
+                material::endless(&subject.model, which, context)
+            }),
+        ),
+    ];
+    let mut canvas = Canvas::new(sheet);
+    let mut count = 0;
+    context.progress.begin("render", (ways.len() * height) as u64, Counted::Items("rows"));
+    for (label, texture) in &ways {
+        let picture = match texture().and_then(|texture| subject.picture(options, &texture)) {
+            Ok(picture) => picture,
+            Err(error) if matches!(error.kind(), crate::ErrorKind::Missing | crate::ErrorKind::Usage) => {
+                notes.push(format!("{label}: left out: {error}"));
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let (top, left) = place(count, options.size);
+        canvas.text(top, left, label);
+        canvas.put(top + LINE, left, &exposed(picture, options.exposure).as_display());
+        count += 1;
+    }
+    context.progress.end();
+    if count == 0 {
+        return Err(Error::missing(format!("{}: nothing that could be shown", options.source.display()))
+            .hint(notes.join("; ")));
+    }
+    let (top, left) = place(count, options.size);
+    canvas.text(top, left, "the tile, a pixel a texel");
+    let tile = exposed(subject.flat_tile()?, options.exposure);
+    canvas.put(top + LINE, left, &tile.as_display());
+    let made = super::write(canvas.into_picture(), 1.0, output, encoding, context)?;
+    Ok(Report { pictures: vec![(output.to_owned(), made)], size: sheet, notes })
+}
+
+/// Top left corner of a panel.
+fn place(number: usize, size: Size) -> (usize, usize) {
+    let (row, column) = (number / COLUMNS, number % COLUMNS);
+    (MARGIN + row * (size.height + LINE + MARGIN), MARGIN + column * (size.width + MARGIN))
+}
+
+fn exposed(mut picture: Picture, exposure: f64) -> Picture {
+    picture.pixels.as_flattened_mut().iter_mut().for_each(|value| *value *= exposure as f32);
+    picture
+}
+
+impl Subject<'_> {
+    /// The object, covered with a texture.
+    fn picture(&self, options: &Options, texture: &Texture) -> Result<Picture> {
+        let bounds = match texture {
+            Texture::Whole { size, wraps, .. } => Some((*size, *wraps)),
+            Texture::Pieces(_) => None,
+        };
+        let object = objects::object(options, bounds, self.context)?;
+        let camera = Camera::new(objects::view(options, &object), options.size)?;
+        let (lights, _) = lights(options)?;
+        let scene = Scene {
+            surface: object.surface,
+            lights,
+            background: Background::Grey(options.background),
+            shadows: options.shadows,
+            density: object.density,
+            origin: object.origin,
+            turn_rad: 0.0,
+        };
+        let samples = options.samples.unwrap_or(object.samples);
+        let material = (&self.evaluator, texture);
+        let rendered = crate::render::render(&scene, &camera, material, options.size, samples, self.context)?;
+        Ok(rendered.picture)
+    }
+
+    /// As much of the tile as a panel holds.
+    fn flat_tile(&self) -> Result<Picture> {
+        let (texture, bounds) = material::tile(&self.model, None)?;
+        let Size { height, width } = bounds.map_or(self.options.size, |(size, _)| size);
+        let size = Size::new(height.min(self.options.size.height), width.min(self.options.size.width));
+        let options = Options { shape: super::Shape::Flat, size, scale: 1.0, ..self.options.clone() };
+        let options = Options { camera: super::CameraOptions::default(), samples: None, ..options };
+        self.picture(&options, &texture)
+    }
+
+    fn two_tiles(&self) -> Result<Texture> {
+        let tile = self.model.tile()?;
+        let index = of_stage(&self.model, Stage::Cluster, Model::index)?;
+        let exemplar = Exemplar::new(tile.size, tile.wraps, index.clone(), &self.model.distance()?)?;
+        let tiles = self.context.compute(|| Tiles::new(&exemplar, 2, SEED, None))?;
+        let make: Maker = Box::new(move |area: Area| {
+            let texels = tiles.window(area.y, area.x, area.size);
+            Ok(texels.into_iter().map(|texel| index[texel as usize]).collect())
+        });
+        Ok(Texture::Pieces(Pieces::new(make, None, self.context.work_bytes() / 4)))
+    }
+
+    /// A plane by the paper's rule, with a field that is fitted here.
+    fn paper(&self, kind: CarKind) -> Result<Texture> {
+        let tile = self.model.tile()?;
+        let (normals, index) = (
+            of_stage(&self.model, Stage::Normals, Model::normals)?,
+            of_stage(&self.model, Stage::Cluster, Model::index)?,
+        );
+        self.context.require("fitting a random field", fit::memory_bytes(tile.size.texels()))?;
+        let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
+        let chosen = field::Options { kind, levels: None, gains: Gains::Matched, boundary };
+        let scan = Scan::new(index, &self.model.distance()?);
+        let candidates = CANDIDATES.min(tile.size.texels());
+        let side = (PAPER_SIDE / self.options.scale.min(1.0)).min(4.0 * PAPER_SIDE) as usize;
+        let size = Size::new(side, side);
+        let kernel = Kernel::fastest();
+        let index = self.context.compute(|| -> Result<Vec<u16>> {
+            let joint = Some(Matching::Joint);
+            let surface = Surface::fit(tile.size, &normals, Coordinates::Normals, joint, &chosen)?;
+            let nearest = NearestNormals::new(&normals, candidates, kernel);
+            let mut synthesis =
+                Synthesis::new(&surface.field, SEED, size.height, size.width, Extent::Endless, kernel)?;
+            let mut index: Vec<u16> = Vec::with_capacity(size.texels());
+            let mut row = vec![[0.0; 3]; size.width];
+            let (mut found, mut sources) = (vec![0; size.width * candidates], vec![0; size.width]);
+            for y in 0..size.height {
+                surface.next_rows(&mut synthesis, size.width, &mut row)?;
+                found
+                    .par_chunks_mut(64 * candidates)
+                    .zip(row.par_chunks(64))
+                    .for_each(|(found, normals)| nearest.find_row(normals, found));
+                let above = (y > 0).then(|| &index[(y - 1) * size.width..]);
+                scan.choose_row(&found, Neighbours { above, below: None, wraps: false }, &mut sources);
+                let chosen: Vec<u16> = sources.iter().map(|&texel| scan.cluster(texel)).collect();
+                index.extend(chosen);
+            }
+            Ok(index)
+        })?;
+        Ok(Texture::Whole { size, wraps: false, index })
+    }
+}

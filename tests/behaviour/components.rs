@@ -1,0 +1,208 @@
+//! Components of a model, and the packed file: what comes back, whatever the samples, threads and memory.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::fixture::{assert_same, btf, copy, fail, fixture, succeed, tree};
+
+/// A measurement of the fixture's archive, imported with options, and a model of its whole plane with components.
+fn model(folder: &Path, import: &[&str], components: &[&str]) -> [PathBuf; 2] {
+    let [store, model] = ["m.zarr", "m.model.zarr"].map(|name| folder.join(name));
+    succeed(btf().arg("import").args([&fixture().archive(), &store]).args(import));
+    succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
+    let told = succeed(btf().arg("components").args([&store, &model]).args(components));
+    assert!(told.contains("components, PSNR"), "{told}");
+    [store, model]
+}
+
+fn json(command: &mut Command) -> Value {
+    serde_json::from_str(&succeed(command.arg("--json"))).unwrap()
+}
+
+#[test]
+fn components_are_packed_and_come_back_whatever_the_samples() {
+    for import in
+        [&[][..], &["--samples", "u16"], &["--samples", "f16", "--transfer", "linear"], &["--samples", "f32"]]
+    {
+        let folder = tempfile::tempdir().unwrap();
+        let [store, model] = model(folder.path(), import, &["--components", "24"]);
+        let [file, again] = ["m.btfc", "again.model.zarr"].map(|name| folder.path().join(name));
+        let packed = json(btf().arg("pack").args([&model, &file]).args(["--quality", "1:100"]));
+        let (bytes, raw) = (packed["bytes"].as_u64().unwrap(), packed["tile_bytes"].as_u64().unwrap());
+        assert!(100 * bytes <= raw && 101 * bytes > raw * 99 / 100, "{import:?}: {packed}");
+        succeed(btf().arg("unpack").args([&file, &again]));
+        let compared = json(btf().arg("compare").args([&store, &again]));
+        let whole = json(btf().arg("compare").args([&store, &model]).args(["--by", "components"]));
+        let of = |report: &Value, name: &str| report["all"][name].as_f64().unwrap();
+        // The packed one is coarser than the model, and as good as was said where samples lie on the sRGB curve.
+        assert!(of(&compared, "psnr_db") < of(&whole, "psnr_db"), "{import:?}: {compared} {whole}");
+        assert!(of(&compared, "lightness") < 3.0, "{import:?}: {compared}");
+        if !import.contains(&"linear") {
+            let said = packed["psnr_db"].as_f64().unwrap();
+            let found = of(&compared, "psnr_db");
+            assert!((said - 0.1..said + 0.4).contains(&found), "{import:?}: {said} {found}");
+        }
+        succeed(btf().arg("verify").arg(&again));
+    }
+}
+
+#[test]
+fn bytes_depend_on_neither_threads_nor_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let made: Vec<PathBuf> = [["--threads", "1"], ["--threads", "5"], ["--memory", "40MiB"]]
+        .iter()
+        .enumerate()
+        .map(|(number, options)| {
+            let at = folder.path().join(number.to_string());
+            std::fs::create_dir(&at).unwrap();
+            let [_, model] = model(&at, &[], options);
+            succeed(btf().arg("pack").args([&model, &at.join("m.btfc")]).args(options));
+            std::fs::remove_dir_all(at.join("m.zarr")).unwrap();
+            at
+        })
+        .collect();
+    assert_same(&made[0], &made[1]);
+    assert_same(&made[0], &made[2]);
+    let told = fail(
+        btf()
+            .arg("components")
+            .args([&fixture().measurement(), &fixture().model()])
+            .args(["--memory", "8MiB"]),
+        2,
+    );
+    assert!(told.contains("finding components of") && told.contains("--memory"), "{told}");
+}
+
+#[test]
+fn a_model_of_components_is_pictured_and_an_enlargement_with_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = at("c.model.zarr");
+    copy(&fixture().model(), &whole);
+    let told =
+        fail(btf().arg("image").arg(&whole).args(["--values", "components", "--out"]).arg(at("i.png")), 66);
+    assert!(told.contains("run `btf components` on it first"), "{told}");
+    succeed(btf().arg("components").args([&fixture().measurement(), &whole]));
+    let picture = |source: &Path, name: &str, options: &[&str]| {
+        let told = succeed(btf().arg("image").arg(source).args(options).arg("--out").arg(at(name)));
+        (told, std::fs::read(at(name)).unwrap())
+    };
+    let exact = ["--values", "measured", "--measurement", fixture().measurement().to_str().unwrap()]
+        .map(String::from);
+    let exact: Vec<&str> = exact.iter().map(String::as_str).collect();
+    let (_, measured) = picture(&whole, "measured.png", &exact);
+    let (_, clusters) = picture(&whole, "clusters.png", &[]);
+    let (_, components) = picture(&whole, "components.png", &["--values", "components"]);
+    let pixels = |bytes: &[u8]| image::load_from_memory(bytes).unwrap().into_rgb8().into_raw();
+    let distance = |a: &[u8], b: &[u8]| -> u64 {
+        pixels(a).iter().zip(pixels(b)).map(|(&a, b)| u64::from(a.abs_diff(b)).pow(2)).sum()
+    };
+    assert!(2 * distance(&components, &measured) < distance(&clusters, &measured));
+    // Of a model without clusters nothing need be asked for, and it is said.
+    succeed(btf().arg("pack").args([&whole, &at("c.btfc")]).args(["--quality", "1:20"]));
+    succeed(btf().arg("unpack").args([&at("c.btfc"), &at("u.model.zarr")]));
+    let (told, unpacked) = picture(&at("u.model.zarr"), "u.png", &[]);
+    assert!(told.contains("the model has no clusters: values are those of its components"), "{told}");
+    assert!(2 * distance(&unpacked, &measured) < distance(&clusters, &measured));
+    let (told, packed) = picture(&at("c.btfc"), "p.png", &[]);
+    assert!(distance(&packed, &unpacked) < 100 && told.contains("p.png"), "{told}");
+    picture(&at("c.btfc"), "w.png", &["--window", "3,4,8,9", "--light", "45,90"]);
+    for options in [&["--values", "measured"][..], &["--what", "index"], &["--plane", "--window", "0,0,9,9"]]
+    {
+        let told = fail(btf().arg("image").arg(at("c.btfc")).args(options).args(["--out", "y.png"]), 2);
+        assert!(told.contains("a packed model has") && told.contains("btf unpack"), "{told}");
+    }
+    // The tile was cut: which texel was measured where is not known any more.
+    let told = fail(btf().arg("compare").args([&fixture().measurement(), &at("u.model.zarr")]), 65);
+    assert!(told.contains("is not what"), "{told}");
+    succeed(btf().arg("enlarge").args([&whole, &at("big.zarr")]).args(["--size", "64x64"]));
+    let (_, by_clusters) = picture(&at("big.zarr"), "e.png", &[]);
+    let (_, by_components) = picture(&at("big.zarr"), "f.png", &["--values", "components"]);
+    assert_ne!(by_clusters, by_components);
+    let told = fail(
+        btf().arg("image").arg(&whole).args([
+            "--values",
+            "components",
+            "--measurement",
+            "x",
+            "--out",
+            "y.png",
+        ]),
+        2,
+    );
+    assert!(told.contains("--measurement"), "{told}");
+}
+
+#[test]
+fn a_packed_file_is_told_of_cut_and_never_trusted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [_, model] = model(folder.path(), &[], &[]);
+    let file = at("m.btfc");
+    let pack = |quality: &str| {
+        let mut command = btf();
+        command.arg("pack").args([&model, &file]).args(["--quality", quality]);
+        command
+    };
+    let told = succeed(pack("30kB").args(["--licence", "CC-BY-4.0", "--texel-mm", "0.25"]));
+    assert!(
+        told.contains("of the tile's samples") && told.contains("may serve the same bytes better"),
+        "{told}"
+    );
+    let about = json(btf().arg("info").arg(&file));
+    assert_eq!((&about["kind"], &about["size"]), (&"packed model".into(), &serde_json::json!([56, 48])));
+    let told = succeed(btf().arg("info").arg(&file));
+    assert!(told.contains("CC-BY-4.0") && told.contains("0.25") && told.contains("plane 6"), "{told}");
+    let again = succeed(pack("30kB").args(["--licence", "CC-BY-4.0", "--texel-mm", "0.25"]));
+    assert!(again.contains("found done"), "{again}");
+    fail(&mut pack("20kB"), 65);
+    for (quality, expected) in
+        [("9", "expected at least"), ("90dB", "expected at most"), ("1:x", "expected bytes")]
+    {
+        let told = fail(pack(quality).arg("--force"), 2);
+        assert!(told.contains(expected), "{told}");
+    }
+    let told = fail(btf().arg("pack").args([&model, &at("m.zarr2")]), 2);
+    assert!(told.contains(".btfc"), "{told}");
+
+    let bytes = std::fs::read(&file).unwrap();
+    let ends: Vec<usize> = about["planes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|plane| plane["bytes"].as_u64().unwrap() as usize)
+        .collect();
+    let cut = at("cut.btfc");
+    for (length, planes) in [(ends[2], 3), (ends[3] + 1, 4)] {
+        std::fs::write(&cut, &bytes[..length]).unwrap();
+        let told = succeed(btf().arg("info").arg(&cut));
+        assert!(told.contains(&format!("{planes} of 6 planes are there")), "{told}");
+        let unpacked = at(&format!("cut-{planes}.model.zarr"));
+        let told = succeed(btf().arg("unpack").args([&cut, &unpacked]));
+        assert!(told.contains("the file was cut"), "{told}");
+        assert!(succeed(btf().arg("unpack").args([&cut, &unpacked])).contains("found done"));
+        succeed(btf().arg("image").arg(&unpacked).arg("--out").arg(at(&format!("{planes}.png"))));
+        let before = tree(&unpacked);
+        fail(btf().arg("unpack").args([&file, &unpacked]), 65);
+        assert_eq!(tree(&unpacked), before);
+    }
+    let mut damaged = bytes.clone();
+    damaged[ends[4] + 30] ^= 1;
+    std::fs::write(&cut, &damaged).unwrap();
+    let told = succeed(btf().arg("info").arg(&cut));
+    assert!(told.contains("is damaged: 5 of 6 planes are read"), "{told}");
+    damaged[40] ^= 1;
+    std::fs::write(&cut, &damaged).unwrap();
+    for command in ["info", "unpack"] {
+        let mut run = btf();
+        run.arg(command).arg(&cut);
+        if command == "unpack" {
+            run.arg(at("none.model.zarr"));
+        }
+        let told = fail(&mut run, 65);
+        assert!(told.contains("a damaged header: its checksum differs"), "{told}");
+    }
+    assert!(!at("none.model.zarr").exists());
+}

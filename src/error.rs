@@ -194,6 +194,10 @@ pub(crate) fn is_loop(error: &std::io::Error) -> bool {
 pub(crate) const NO_THREADS: &str =
     "choose fewer by --threads, or raise the limits of processes and memory (ulimit -u, ulimit -v)";
 
+/// What to do where an input was changed while it was read.
+pub(crate) const BEGIN_AGAIN: &str = "begin again when nobody writes it any more, with --force: what has been made of it \
+                                      as it was before is another recipe's, and is replaced";
+
 /// Whether an operating system's error has this number; the numbers of Linux and of the systems after BSD are the same.
 fn is_number(error: &std::io::Error, numbers: &[i32]) -> bool {
     error.raw_os_error().is_some_and(|number| numbers.contains(&number))

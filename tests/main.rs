@@ -45,6 +45,8 @@ mod equations;
 mod examples;
 #[path = "behaviour/fixture.rs"]
 mod fixture;
+#[path = "behaviour/forged_stores.rs"]
+mod forged_stores;
 #[path = "behaviour/input_words.rs"]
 mod input_words;
 #[path = "behaviour/interruption.rs"]
@@ -80,6 +82,8 @@ mod real_data;
 mod recipes;
 #[path = "behaviour/rendering.rs"]
 mod rendering;
+#[path = "behaviour/resident_memory.rs"]
+mod resident_memory;
 #[path = "behaviour/safety.rs"]
 mod safety;
 #[path = "behaviour/setup.rs"]

@@ -13,7 +13,7 @@ use btfkit_formats::{
 use super::adapt::Type;
 use super::{HEAD_BYTES, Options, Source, digest_of, files, read_beside};
 use crate::disk::mapped::MappedFile;
-use crate::error::{Error, Result};
+use crate::error::{BEGIN_AGAIN, Error, Result};
 use crate::run::Context;
 
 /// Groups that the lights of a view are read in: enough for some threads, few enough that what a group has
@@ -273,7 +273,7 @@ impl Container {
             return Ok(());
         }
         Err(Error::input(format!("{}: the file was changed while it was read", self.path.display()))
-            .hint("begin again when nobody writes it any more"))
+            .hint(BEGIN_AGAIN))
     }
 }
 

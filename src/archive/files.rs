@@ -169,7 +169,7 @@ impl Files {
             return Ok(());
         }
         let file = MappedFile::open(&path).map_err(|error| Error::io("read", &path, error))?;
-        let index = ZipIndex::open_mapped(file.as_ref(), limits, &mut |range| file.release(range))
+        let index = ZipIndex::open_mapped(file.as_ref(), limits, &mut file.walk())
             .map_err(|error| Error::from(error).context(path.display()))?;
         // The directory at the end.
         file.release(0..file.as_ref().len());

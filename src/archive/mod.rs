@@ -24,12 +24,13 @@ use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 pub use container::name_of;
 
 use crate::color::Remarkable;
-use crate::error::{Error, Result};
+use crate::error::{Error, ErrorKind, Result};
 use crate::run::{Context, recipe};
 use adapt::Adaptation;
 
@@ -168,9 +169,25 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// As the recipe of a store holds it; nothing is mended where an older or a crafted one does not say it.
-    pub fn in_recipe(reading: &serde_json::Value) -> Self {
-        Self::deserialize(reading).unwrap_or_default()
+    /// The reading that a recipe holds. A recipe that is older than an option does not name it.
+    ///
+    /// # Errors
+    /// What no reading has: another name, another type, views out of order, a turn that is not by right angles.
+    pub(crate) fn parse(stored: &Value) -> std::result::Result<Self, String> {
+        let reading: Self = serde_json::from_value(stored.clone()).map_err(|error| error.to_string())?;
+        let known = serde_json::to_value(&reading).map_err(|error| error.to_string())?;
+        let unknown = |name: &&String| known.get(name.as_str()).is_none();
+        if let Some(name) = stored.as_object().into_iter().flat_map(|members| members.keys()).find(unknown) {
+            return Err(format!("unknown field `{name}`"));
+        }
+        let Adaptation { drop_views, turn_deg, .. } = &reading.adaptation;
+        if !drop_views.is_sorted_by(|a, b| a < b) {
+            return Err(format!("drop_views: got {drop_views:?}, expected each once, in order"));
+        }
+        if *turn_deg >= 360 || turn_deg % 90 != 0 {
+            return Err(format!("turn_deg: got {turn_deg}, expected 0, 90, 180 or 270"));
+        }
+        Ok(reading)
     }
 
     /// Every option by its name, so that a new one is not forgotten.
@@ -190,6 +207,29 @@ impl Reading {
             bottom_row_first: *rows == RowOrder::BottomFirst,
             columns_as_rows: *hdr_orientation == HdrOrientation::Atrium,
         }
+    }
+}
+
+/// All images of a view, in the groups of lights that are best read at once: what a reader maps stays small.
+///
+/// # Errors
+/// Names every unusable image of the view.
+pub(crate) fn read_groups(source: &dyn Source, view: usize) -> Result<Vec<(Range<usize>, Samples)>> {
+    let lights = source.contents().lights.len();
+    let step = source.lights_at_once().clamp(1, lights.max(1));
+    let (mut groups, mut problems) = (Vec::new(), Vec::new());
+    for first in (0..lights).step_by(step) {
+        let group = first..(first + step).min(lights);
+        match source.read_images(view, group.clone()) {
+            Ok(samples) => groups.push((group, samples)),
+            Err(error) if error.kind() == ErrorKind::Input => problems.push(error.to_string()),
+            Err(error) => return Err(error),
+        }
+    }
+    problems.dedup();
+    match problems.is_empty() {
+        true => Ok(groups),
+        false => Err(Error::list(ErrorKind::Input, problems.iter().flat_map(|problem| problem.lines()))),
     }
 }
 

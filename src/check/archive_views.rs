@@ -3,7 +3,7 @@
 use btfkit_formats::Samples;
 
 use super::source::Views;
-use crate::archive::Source;
+use crate::archive::{Source, read_groups};
 use crate::error::Result;
 use crate::shape::Window;
 use crate::store::measurement::Description;
@@ -29,9 +29,12 @@ impl Views for ArchiveViews<'_> {
 
     fn read_view(&self, view: usize, window: Window) -> Result<Samples> {
         let Description { size, sample_type, .. } = self.description;
-        let lights = 0..self.description.lights.len();
-        let samples = self.source.read_images(view, lights.clone())?;
-        let images = Images::new(size, self.description.n_channels(), sample_type, vec![(lights, samples)])?;
+        let groups = read_groups(self.source, view)?;
+        let images = Images::new(size, self.description.n_channels(), sample_type, groups)?;
         Ok(images.gather(window))
+    }
+
+    fn reading_bytes(&self) -> u64 {
+        self.description.view_bytes() + self.source.bytes_beside_image()
     }
 }

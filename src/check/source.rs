@@ -12,6 +12,12 @@ pub trait Views: Sync {
     fn description(&self) -> &Description;
     /// Samples of a window under one view, [y, x, light, channel].
     fn read_view(&self, view: usize, window: Window) -> Result<Samples>;
+    /// Memory that reading one view takes, beside the samples that are handed out: of another view, of images, of a
+    /// file that is decoded.
+    fn reading_bytes(&self) -> u64 {
+        // The mapped shards; chunks compress.
+        self.description().view_bytes()
+    }
 }
 
 impl Views for Measurement {

@@ -162,7 +162,8 @@ pub(crate) fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statis
         description.size,
         counted(description.lights.len(), "light")
     );
-    let in_flight = units::in_flight(context, &what, 2 * description.view_bytes())?;
+    let unit_bytes = description.view_bytes() + source.reading_bytes();
+    let in_flight = units::in_flight_beside(context, &what, unit_bytes, kept_bytes(description))?;
     let parts = units::for_each(context, &views, in_flight, |&view| {
         let part = of_view(source, view, view == frontal)?;
         context.progress.advance(1);
@@ -193,6 +194,15 @@ pub(crate) fn gather(source: &dyn Views, context: &Context<'_>) -> Result<Statis
         frontal_luminance,
         view_means,
     })
+}
+
+/// Bytes of what is gathered of all views: images with their thumbnails, and the windows.
+fn kept_bytes(description: &Description) -> u64 {
+    let (views, lights) = (description.views.len(), description.lights.len());
+    let window = description.size.middle(WINDOW).size.texels();
+    let thumbnail = THUMBNAIL_SIDE.min(description.size.height) * THUMBNAIL_SIDE.min(description.size.width);
+    let of_images = views * lights * (size_of::<Image>() + thumbnail * size_of::<f32>());
+    (of_images + window * (views + lights) * size_of::<f32>()) as u64
 }
 
 /// The view nearest to the surface normal, the first of equals.

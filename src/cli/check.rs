@@ -1,6 +1,5 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::archive::Reading;
 use btfkit::check::archive_views::ArchiveViews;
 use btfkit::check::finding::MOST_ALARM;
 use btfkit::check::{self, Finding, Report, State, Statistics};
@@ -81,7 +80,8 @@ impl Check {
             given.refuse_for_stores(paths)?;
             let measurement = open(path)?;
             let (statistics, mut report) = check::run(&measurement, context)?;
-            report.beside(&Reading::in_recipe(&measurement.recipe().reading).adaptation);
+            let reading = measurement.recipe().how_read().map_err(Error::input)?;
+            report.beside(&reading.adaptation);
             return Ok(Examined { statistics, report, notes: Vec::new() });
         }
         let source = self.source.open(paths)?;

@@ -20,7 +20,8 @@ pub(super) struct ClusterOptions {
     /// Number of clusters [default: 256, or as many as the tile has texels]
     #[arg(long, group = "amount", value_parser = number::count)]
     clusters: Option<usize>,
-    /// Instead of --clusters: as few as leave a mean error of at most this, in units of lightness L*
+    /// Instead of --clusters: as few as leave a mean error of at most this, in units of lightness L*, between texels and
+    /// the measured texels that are stored for them
     #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
     error: Option<f64>,
     /// Instead of --clusters: as many as make the model N times smaller than the raw measurement

@@ -4,6 +4,7 @@ use btfkit::error::Result;
 use btfkit::names::ends_with;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
+use btfkit::stage::deepzoom::recipe::PyramidRecipe;
 use btfkit::stage::verify::is_pyramid;
 use btfkit::stage::{estimate, import, pack};
 use btfkit::store::model::Stage;
@@ -380,9 +381,11 @@ fn of_pyramid(about: &Pyramidal) -> Rows {
         ],
         row!["finished", yes(about.kept.finished)],
     ];
-    for name in ["view", "light", "exposure"] {
-        rows.extend(about.recipe.get(name).map(|value| row![name, value]));
-    }
+    let PyramidRecipe { view, light, exposure, .. } = &about.recipe;
+    rows.extend(
+        [("view", view), ("light", light)].map(|(name, [theta, phi])| row![name, format!("{theta},{phi}")]),
+    );
+    rows.push(row!["exposure", exposure]);
     rows.extend(of_kept(&about.kept));
     rows
 }

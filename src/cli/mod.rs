@@ -46,7 +46,7 @@ use std::time::Duration;
 
 use btfkit::disk::output::Made;
 use btfkit::error::{Error, ErrorKind, Result};
-use btfkit::run::budget::{Allowance, cannot_start, expect_stack, spare_address_space};
+use btfkit::run::budget::{Allowance, cannot_start, expect_stack, return_large_buffers, spare_address_space};
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::run::{Context, Existing};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
@@ -186,6 +186,7 @@ pub(crate) fn run() -> ExitCode {
         json: cli.common.progress == ProgressStyle::Json,
     };
     let memory = Allowance::new(cli.common.memory);
+    return_large_buffers();
     if memory.by_system {
         spare_address_space();
     }

@@ -1,6 +1,5 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::archive::Reading;
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
@@ -86,7 +85,7 @@ impl Verify {
             None
         } else {
             let reading = Measurement::open(path)
-                .map(|store| Reading::in_recipe(&store.recipe().reading))
+                .map(|store| store.recipe().how_read().unwrap_or_default())
                 .unwrap_or_default();
             Some(self.source.open_as_in(reading, &self.archive)?)
         };

@@ -9,7 +9,6 @@ use crate::picture::Picture;
 use crate::run::Context;
 use crate::stage::normals::mean_and_spread;
 use crate::stage::{cluster, compare, normals, tile};
-use crate::store::model::Stage;
 use crate::store::model::field::FieldReport;
 
 /// Side of the squares whose means show how patchy a picture is, texels.
@@ -118,7 +117,7 @@ impl Figures {
         context: &Context<'_>,
     ) -> Result<Self> {
         let model = &workshop.model;
-        let cluster: cluster::Report = model.report(Stage::Cluster)?;
+        let cluster = model.cluster_report()?;
         let picture = |subject| workshop.picture(subject, context);
         let in_tile = shares(&workshop.tile_index, cluster.clusters);
         let enlarged = Likeness::of(&picture(Subject::ENLARGED)?, &workshop.enlarged_index, &in_tile);
@@ -142,9 +141,9 @@ impl Figures {
             ],
         };
         Ok(Self {
-            tile: model.report(Stage::Tile)?,
-            normals: model.report(Stage::Normals)?,
-            field: model.report(Stage::Fit)?,
+            tile: model.tile_report()?,
+            normals: model.normals_report()?,
+            field: model.field_report()?,
             compare,
             second_tile_visibility: seam_visibility(&workshop.features, &workshop.second_tile.tile),
             second_tile_origin: workshop.second_tile.origin,

@@ -17,7 +17,7 @@ use crate::stage::image::{cluster_colors, look_up, of_measured_tile, of_measurem
 use crate::stage::tile::features;
 use crate::store::enlarged::Enlarged;
 use crate::store::measurement::Measurement;
-use crate::store::model::{Model, Stage};
+use crate::store::model::Model;
 use btfkit_formats::Direction;
 
 /// Pictures with a side above this are embedded as JPEG, smaller ones as PNG.
@@ -114,7 +114,7 @@ impl Workshop {
     ) -> Result<Self> {
         let (measurement, model) = (Measurement::open(measurement)?, Model::open(model)?);
         let (enlarged, by_paper) = (Enlarged::open(enlarged)?, Enlarged::open(by_paper)?);
-        let report: crate::stage::tile::Report = model.report(Stage::Tile)?;
+        let report = model.tile_report()?;
         let patch = report
             .patch
             .ok_or_else(|| Error::internal(format!("{} has no cut tile", model.path().display())))?;

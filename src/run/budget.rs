@@ -105,17 +105,33 @@ fn limit(limits: &str, name: &str) -> Option<u64> {
 
 /// Lets all threads allocate from one arena: each of its own reserves 64 MiB of address space, so that with `ulimit -v`
 /// little remains to be used. To be called before threads are started.
-#[allow(unsafe_code)]
 pub fn spare_address_space() {
+    const M_ARENA_MAX: i32 = -8;
+    tune_allocator(M_ARENA_MAX, 1);
+}
+
+/// Lets large buffers go back to the system when they are freed. Left alone, glibc raises its threshold to the size of
+/// whatever was freed, up to 32 MiB, and takes later buffers out of a heap that shrinks only at its end: memory that is
+/// free but resident. To be called before any work.
+pub fn return_large_buffers() {
+    const M_TRIM_THRESHOLD: i32 = -1;
+    const M_MMAP_THRESHOLD: i32 = -3;
+    tune_allocator(M_MMAP_THRESHOLD, 1 << 20);
+    tune_allocator(M_TRIM_THRESHOLD, 2 << 20);
+}
+
+/// Sets a parameter of glibc's allocator; where it is refused, or where there is another allocator, nothing changes.
+#[allow(unsafe_code)]
+fn tune_allocator(parameter: i32, value: i32) {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
-        const M_ARENA_MAX: i32 = -8;
         unsafe extern "C" {
             safe fn mallopt(parameter: i32, value: i32) -> i32;
         }
-        // Refused, it changes nothing.
-        let _ = mallopt(M_ARENA_MAX, 1);
+        let _ = mallopt(parameter, value);
     }
+    #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+    let _ = (parameter, value);
 }
 
 fn space_left(limits: &str, used: &str) -> Option<u64> {

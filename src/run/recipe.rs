@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
@@ -54,11 +54,22 @@ pub trait Recipe: Serialize + DeserializeOwned {
             }
         }
         match settings.remove("method") {
-            Some(method) if method.is_u64() => {}
-            found => return Err(format!("method: got {}, expected a number", found.unwrap_or_default())),
+            Some(method) if method.as_u64().is_some_and(|method| (1..=Self::METHOD).contains(&method)) => {}
+            found => {
+                let found = found.unwrap_or_default();
+                return Err(format!("method: got {found}, expected 1 to {}", Self::METHOD));
+            }
         }
         serde_json::from_value(Value::Object(settings)).map_err(|error| error.to_string())
     }
+}
+
+/// Reads a stored recipe as a member of typed attributes: `#[serde(deserialize_with = "recipe::stored")]`.
+///
+/// # Errors
+/// As [`Recipe::from_value`].
+pub(crate) fn stored<'de, R: Recipe, D: Deserializer<'de>>(from: D) -> std::result::Result<R, D::Error> {
+    R::from_value(&Value::deserialize(from)?).map_err(|what| D::Error::custom(format!("recipe: {what}")))
 }
 
 /// The digest of a recipe: SHA-256 of its JSON with sorted keys, in hexadecimal.

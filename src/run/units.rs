@@ -14,8 +14,21 @@ use crate::run::{Context, spawn};
 /// # Errors
 /// Where memory does not even allow one.
 pub(crate) fn in_flight(context: &Context<'_>, what: &str, unit_bytes: u64) -> Result<usize> {
-    context.require(what, unit_bytes)?;
-    let affordable = context.work_bytes() / unit_bytes.max(1);
+    in_flight_beside(context, what, unit_bytes, 0)
+}
+
+/// The same beside bytes that are kept until the end.
+///
+/// # Errors
+/// As [`in_flight`].
+pub(crate) fn in_flight_beside(
+    context: &Context<'_>,
+    what: &str,
+    unit_bytes: u64,
+    kept_bytes: u64,
+) -> Result<usize> {
+    context.require(what, unit_bytes.saturating_add(kept_bytes))?;
+    let affordable = context.work_bytes().saturating_sub(kept_bytes) / unit_bytes.max(1);
     Ok((context.threads.max(1) as u64).min(affordable).max(1) as usize)
 }
 

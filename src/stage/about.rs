@@ -6,7 +6,6 @@ use btfkit_formats::Direction;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::archive::Reading;
 use crate::error::Result;
 use crate::method::coherent::JITTER_ONE;
 pub use crate::stage::deepzoom::Pyramidal;
@@ -232,7 +231,7 @@ fn of_measurement(measurement: &Measurement, kept: impl Fn(u64, bool) -> Kept) -
         views_done,
         digest: measurement.digest().to_owned(),
         archive: Some(recipe.format.clone()).filter(|format| !format.is_empty()),
-        read_with: Reading::in_recipe(&recipe.reading).options(),
+        read_with: recipe.how_read().unwrap_or_default().options(),
         assumptions: recipe.assumptions.clone(),
     }
 }
@@ -256,10 +255,10 @@ fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled>
             .transpose()?
             .map(|recipe| recipe.measurement),
         tile: is_there(Stage::Tile).then(|| model.tile_report()).transpose()?,
-        cluster: is_there(Stage::Cluster).then(|| model.report(Stage::Cluster)).transpose()?,
-        normals: is_there(Stage::Normals).then(|| model.report(Stage::Normals)).transpose()?,
-        field: is_there(Stage::Fit).then(|| model.report(Stage::Fit)).transpose()?,
-        appearance: is_there(Stage::Appearance).then(|| model.report(Stage::Appearance)).transpose()?,
+        cluster: is_there(Stage::Cluster).then(|| model.cluster_report()).transpose()?,
+        normals: is_there(Stage::Normals).then(|| model.normals_report()).transpose()?,
+        field: is_there(Stage::Fit).then(|| model.field_report()).transpose()?,
+        appearance: is_there(Stage::Appearance).then(|| model.appearance_report()).transpose()?,
         components: is_there(Stage::Components).then(|| model.report(Stage::Components)).transpose()?,
         stages,
     })

@@ -72,7 +72,7 @@ impl Plan {
     /// Fits the appearance, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<AppearanceReport> {
         let Some(_lock) = self.model.begin(Stage::Appearance, &self.recipe, context)? else {
-            return self.model.report(Stage::Appearance);
+            return self.model.appearance_report();
         };
         context.progress.begin("appearance", 1, Counted::Items("exemplar"));
         let index = self.model.index()?;

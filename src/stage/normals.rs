@@ -66,7 +66,7 @@ impl Plan {
     /// Estimates the normal map, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Normals, &self.recipe, context)? else {
-            return self.model.report(Stage::Normals);
+            return self.model.normals_report();
         };
         let description = self.measurement.description();
         let view = frontal_view(&self.measurement);

@@ -81,6 +81,13 @@ pub(super) fn read(store: &Store, dimension: &str) -> Result<Vec<Direction>> {
         Error::input(format!("{}: {name}: {what}", store.path().display()))
             .hint("run the command that makes this store again: it writes the directions anew")
     };
+    let coordinate = format!("{dimension}_theta");
+    if store.format() == metadata::OLDEST_FORMAT && store.path().join(&coordinate).exists() {
+        return Err(refused(format!(
+            "the attributes name layout format {}, whose stores have no {coordinate}",
+            metadata::OLDEST_FORMAT
+        )));
+    }
     let count = store.claimed_shape(&name, 2)?[0];
     if !(1..=MOST).contains(&count) {
         return Err(refused(format!("got {count} directions, expected 1 to {MOST}")));

@@ -29,14 +29,22 @@ const KINDS: [&str; 3] = [measurement::KIND, model::KIND, enlarged::KIND];
 /// # Errors
 /// As [`Store::expect`], where there is none of them.
 pub fn kind_of(path: &Path) -> Result<&'static str> {
-    let attributes = Store::at(path).expect_one_of(&KINDS)?;
-    let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
-    let known = KINDS.into_iter().find(|known| *known == kind);
-    known.ok_or_else(|| Error::internal(format!("{}: a store of kind {kind:?}", path.display())))
+    kind_among(path, &KINDS)
 }
 
-/// Whether a file of a store that a recipe makes is one that this program writes, by its way from the root.
-fn is_own(path: &Path) -> bool {
+/// The same among some kinds.
+///
+/// # Errors
+/// As [`kind_of`].
+pub(crate) fn kind_among(path: &Path, kinds: &[&'static str]) -> Result<&'static str> {
+    let attributes = Store::at(path).expect_one_of(kinds)?;
+    let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
+    let known = kinds.iter().find(|known| **known == kind);
+    known.copied().ok_or_else(|| Error::internal(format!("{}: a store of kind {kind:?}", path.display())))
+}
+
+/// Whether a file of a store at `root` that a recipe makes is one that this program writes, by its way from the root.
+fn is_own(root: &Path, path: &Path) -> bool {
     const ARRAYS: [&str; 14] = [
         "reflectance",
         "luminance",
@@ -54,39 +62,64 @@ fn is_own(path: &Path) -> bool {
         "texels",
         "counts",
     ];
-    let is_group =
-        |name: &&str| ["pass_", "part_"].iter().any(|begin| name.strip_prefix(begin).is_some_and(is_number));
+    let is_group = |name: &str| {
+        ["pass_", "part_"].iter().any(|begin| {
+            let digits = name.strip_prefix(begin).unwrap_or_default();
+            !digits.is_empty() && digits.len() < 20 && digits.bytes().all(|byte| byte.is_ascii_digit())
+        })
+    };
     let Some(parts) = path.iter().map(|part| part.to_str()).collect::<Option<Vec<&str>>>() else {
         return false;
     };
-    let mut parts = parts.into_iter().skip_while(is_group).peekable();
-    let in_array = parts.next_if(|name| ARRAYS.contains(name)).is_some();
-    match (in_array, parts.next()) {
-        (true, Some(name)) => is_part_of_array(name, parts),
-        (false, Some(metadata::FILE)) => parts.next().is_none(),
-        (false, Some(enlarged::state::NAME | origin::MODEL | origin::MEASUREMENT)) => parts.next().is_none(),
+    let groups = parts.iter().take_while(|name| is_group(name)).count();
+    let array = parts.get(groups).filter(|name| ARRAYS.contains(name));
+    match (array, &parts[groups..]) {
+        (Some(_), [_, ..]) => {
+            let folder: std::path::PathBuf = path.iter().take(groups + 1).collect();
+            let within: std::path::PathBuf = path.iter().skip(groups + 1).collect();
+            is_of_array(&root.join(folder), &within)
+        }
+        (None, [metadata::FILE | enlarged::state::NAME | origin::MODEL | origin::MEASUREMENT]) => true,
         _ => false,
     }
 }
 
-/// Whether a path in the folder of an array is one that a run writes: its metadata, or a chunk.
-pub(crate) fn is_of_array(path: &Path) -> bool {
+/// Whether a path in the folder of an array is one that a run writes: its metadata, or a chunk of those that there are.
+pub(crate) fn is_of_array(folder: &Path, path: &Path) -> bool {
     let parts: Option<Vec<&str>> = path.iter().map(|part| part.to_str()).collect();
-    let mut parts = parts.into_iter().flatten();
-    parts.next().is_some_and(|name| is_part_of_array(name, parts))
-}
-
-fn is_part_of_array<'a>(name: &str, rest: impl Iterator<Item = &'a str>) -> bool {
-    let mut rest = rest.peekable();
-    match name {
-        metadata::FILE => rest.next().is_none(),
-        "c" => rest.peek().is_some() && rest.all(is_number),
+    match parts.as_deref() {
+        Some([metadata::FILE]) => true,
+        Some(["c", place @ ..]) => is_chunk(folder, place),
         _ => false,
     }
 }
 
-fn is_number(text: &str) -> bool {
-    !text.is_empty() && text.len() < 20 && text.bytes().all(|byte| byte.is_ascii_digit())
+/// Whether an array has a chunk of this name. Of an array whose metadata are damaged every number is one.
+fn is_chunk(folder: &Path, place: &[&str]) -> bool {
+    let Some(place) = place.iter().map(|text| number(text)).collect::<Option<Vec<u64>>>() else {
+        return false;
+    };
+    match grid_of(folder) {
+        Some(grid) => {
+            grid.len() == place.len() && place.iter().zip(grid).all(|(&number, length)| number < length)
+        }
+        None => !place.is_empty(),
+    }
+}
+
+/// Chunks (or shards) of an array in each dimension, as its metadata claim.
+fn grid_of(folder: &Path) -> Option<Vec<u64>> {
+    let document = metadata::read_object(&folder.join(metadata::FILE)).ok()??;
+    let list = |value: &Value| serde_json::from_value::<Vec<u64>>(value.clone()).ok();
+    let shape = list(document.get("shape")?)?;
+    let chunk = list(document.get("chunk_grid")?.get("configuration")?.get("chunk_shape")?)?;
+    let divided = |(&length, &side): (&u64, &u64)| (side > 0).then(|| length.div_ceil(side));
+    (shape.len() == chunk.len()).then(|| shape.iter().zip(&chunk).map(divided).collect())?
+}
+
+/// The number that a text is, as names of chunks are written.
+fn number(text: &str) -> Option<u64> {
+    text.parse().ok().filter(|number: &u64| number.to_string() == text)
 }
 
 /// Name of the lock that whoever writes a store by a recipe shares with others who do.
@@ -205,7 +238,7 @@ impl Store {
                 others.join(", ")
             ));
         }
-        remove_folder(self.path(), is_own)
+        remove_folder(self.path(), |path| is_own(self.path(), path))
     }
 
     /// The kind that a root names, however damaged its other attributes are.

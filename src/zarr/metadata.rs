@@ -122,6 +122,9 @@ pub(crate) fn check_ours(ours: &Map<String, Value>, is_root: bool) -> std::resul
             }
         }
     }
+    if is_root {
+        expect_format(ours, needs_seal)?;
+    }
     match ours.get("seal") {
         None if !needs_seal => {}
         found if found.and_then(Value::as_str) == Some(seal(ours).as_str()) => {}
@@ -134,6 +137,34 @@ pub(crate) fn check_ours(ours: &Map<String, Value>, is_root: bool) -> std::resul
         }
     }
     check_digest(ours)
+}
+
+/// Checks that a root has what its layout has: the version of the program, and in the oldest layout none of what came
+/// later, by which a changed store could claim to be older than its checksums.
+fn expect_format(ours: &Map<String, Value>, is_new: bool) -> std::result::Result<(), String> {
+    match ours.get("version") {
+        Some(Value::String(_)) => {}
+        None if !is_new => {}
+        found => {
+            let found = found.map_or("none".to_owned(), shown);
+            return Err(format!("attribute btfkit.version: got {found}, expected that of a program"));
+        }
+    }
+    let stages = ours.get("stages").and_then(Value::as_object);
+    let mut entries = stages.into_iter().flatten().filter_map(|(_, entry)| entry.as_object());
+    let later = if ours.contains_key("seal") {
+        "a seal"
+    } else if ours.contains_key("checksums") || entries.any(|entry| entry.contains_key("checksums")) {
+        "checksums"
+    } else {
+        return Ok(());
+    };
+    if is_new {
+        return Ok(());
+    }
+    Err(format!(
+        "attribute btfkit.format: got {OLDEST_FORMAT} beside {later}, expected {FORMAT}, whose stores have it"
+    ))
 }
 
 /// Checks that `digest` is that of `recipe`, where there is one.
@@ -194,7 +225,7 @@ mod tests {
     fn any_change_of_an_attribute_breaks_the_seal() {
         let recipe = json!({"size": [3, 4], "white": 0.1, "theta": 14.999999999999998});
         let ours = json!({
-            "kind": "model", "format": FORMAT, "recipe": recipe, "digest": recipe::digest(&recipe), "list": [1, 2.5],
+            "kind": "model", "format": FORMAT, "version": "0", "recipe": recipe, "digest": recipe::digest(&recipe), "list": [1, 2.5],
         });
         let mut ours = ours.as_object().unwrap().clone();
         ours.insert("seal".to_owned(), json!(seal(&ours)));

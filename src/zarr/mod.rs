@@ -22,7 +22,7 @@ use serde_json::{Map, Value, json};
 use zarrs::array::DataType;
 
 use crate::disk::mapped;
-use crate::error::{Error, Result};
+use crate::error::{BEGIN_AGAIN, Error, Result};
 pub use array::{Array, Layout, Named};
 pub use codec::Chain;
 pub use metadata::FORMAT;
@@ -185,7 +185,7 @@ impl Store {
             return Ok(());
         }
         Err(Error::input(format!("{} was made anew while it was read", self.path.display()))
-            .hint("run the same command again"))
+            .hint(BEGIN_AGAIN))
     }
 
     /// A result of reading; where that failed since the store was made anew, this is said instead.

@@ -29,7 +29,7 @@ struct Small {
     folder: TempDir,
 }
 
-const METHODS: [&str; 6] = ["coherent", "paper", "repeat", "tiles", "roller", "quilt"];
+pub const METHODS: [&str; 6] = ["coherent", "paper", "repeat", "tiles", "roller", "quilt"];
 
 fn small() -> &'static Small {
     static SMALL: OnceLock<Small> = OnceLock::new();

@@ -10,7 +10,9 @@ pub enum Amount {
     Usual,
     /// This many, n_c.
     Clusters(usize),
-    /// The fewest whose weighted mean |dL*| from the centres is at most this.
+    /// The fewest whose weighted mean |dL*| from the representatives, which are what is stored, is at most this. Recipes
+    /// by older versions, where it was that from the centres, have another name for it.
+    #[serde(rename = "error_of_representatives", alias = "error")]
     Error(f64),
     /// The most that leave representatives and index this many times smaller than the raw measurement.
     Ratio(f64),

@@ -96,6 +96,17 @@ pub struct Patch {
 }
 
 impl Patch {
+    /// Whether it lies, with its overlap, within a plane of so many rows and columns.
+    pub(crate) fn lies_within(&self, [rows, columns]: [usize; 2]) -> bool {
+        let fits = |start: usize, length: usize, all: usize| {
+            start
+                .checked_add(length)
+                .and_then(|end| end.checked_add(self.overlap))
+                .is_some_and(|end| end <= all)
+        };
+        fits(self.y, self.height, rows) && fits(self.x, self.width, columns)
+    }
+
     /// The patch as it is, taken for a tile that wraps without a cut.
     pub fn uncut(self) -> Tile {
         let mut tile = Tile::whole(Size::new(self.height, self.width), true);

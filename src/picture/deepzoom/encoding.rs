@@ -1,13 +1,14 @@
 //! Formats of tiles.
 
 use btfkit_formats::jpeg;
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::shape::Size;
 
 /// Format of the tiles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Encoding {
     /// Lossless.
     Png,
@@ -21,14 +22,6 @@ impl Encoding {
         match self {
             Self::Png => "png",
             Self::Jpeg(_) => "jpg",
-        }
-    }
-
-    /// As a recipe names it.
-    pub(crate) fn recipe(self) -> Value {
-        match self {
-            Self::Png => json!("png"),
-            Self::Jpeg(quality) => json!({"jpeg": quality}),
         }
     }
 

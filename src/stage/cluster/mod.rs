@@ -41,7 +41,7 @@ use crate::store::model::{Model, Stage};
 use crate::store::origin;
 use crate::words::counted;
 pub(crate) use budget::enough_bytes;
-use pass::{Next, Work};
+use pass::{End, Next, Work};
 pub use reuse::{Options as ReuseOptions, Plan as ReusePlan, plan as plan_reuse};
 
 /// Most clusters: the index is u16.
@@ -328,23 +328,28 @@ impl Plan {
         };
         let mut work = self.work(&state, context)?;
         loop {
-            match work.run(&passes, pass, &state, deadline, context)? {
-                Next::Pass(next) => (pass, state) = (pass + 1, *next),
-                Next::Restart(history) => {
-                    drop(work);
-                    pass += 1;
-                    state = self.restart(&passes, pass, *history, deadline, context)?;
-                    work = self.work(&state, context)?;
+            let history = match work.run(&passes, pass, &state, deadline, context)? {
+                Next::Pass(next) => {
+                    (pass, state) = (pass + 1, *next);
+                    continue;
                 }
-                Next::Finished(result) => return work.finish(&result, context),
-            }
+                Next::Restart(history) => history,
+                Next::Finished(result) => match work.finish(&result, context)? {
+                    End::Model(report) => return Ok(*report),
+                    End::TooLarge(history) => history,
+                },
+            };
+            drop(work);
+            pass += 1;
+            state = self.restart(&passes, pass, *history, deadline, context)?;
+            work = self.work(&state, context)?;
         }
     }
 
     /// How the clustering that is done went. A process that was killed at its end leaves its passes behind.
     fn done(&self) -> Result<Report> {
         Passes::remove(&self.model.path().join(PASSES));
-        self.model.report(Stage::Cluster)
+        self.model.cluster_report()
     }
 
     fn work(&self, state: &State, context: &Context<'_>) -> Result<Work<'_>> {

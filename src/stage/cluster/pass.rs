@@ -30,6 +30,14 @@ pub(super) enum Next {
     Finished(Box<Clustered>),
 }
 
+/// How a clustering ends.
+pub(super) enum End {
+    /// The model is written.
+    Model(Box<Report>),
+    /// Representatives leave too large an error.
+    TooLarge(Box<History>),
+}
+
 /// What one process keeps from pass to pass.
 pub(super) struct Work<'a> {
     plan: &'a Plan,
@@ -154,8 +162,9 @@ impl<'a> Work<'a> {
 }
 
 impl Work<'_> {
-    /// Writes the model. What the representatives leave takes the texels once more: only now are they known.
-    pub(super) fn finish(&mut self, clustered: &Clustered, context: &Context<'_>) -> Result<Report> {
+    /// Writes the model, unless its representatives leave more than was asked for: then there are to be more clusters.
+    /// What they leave takes the texels once more: only now are they known.
+    pub(super) fn finish(&mut self, clustered: &Clustered, context: &Context<'_>) -> Result<End> {
         let Plan { arrangement, selection, .. } = self.plan;
         let vectors = self.plan.read_vectors(&self.plan.sources(clustered), context)?;
         let kernel = self.plan.method(0, None).kernel;
@@ -170,7 +179,14 @@ impl Work<'_> {
             Ok(())
         })?;
         context.progress.end();
-        self.plan.finish(clustered, &vectors, total, context)
+        let error = arrangement.mean_lightness(total) / selection.texels().max(1) as f64;
+        match self.plan.too_large(clustered.nearest.len(), error, &clustered.history) {
+            Some(history) => Ok(End::TooLarge(Box::new(history))),
+            None => self
+                .plan
+                .finish(clustered, &vectors, total, context)
+                .map(|report| End::Model(Box::new(report))),
+        }
     }
 }
 
@@ -235,10 +251,25 @@ impl Plan {
                 self.restart(passes, pass + 1, *history, None, context)?;
                 Ok(Stepped::Next(pass + 1))
             }
-            Next::Finished(result) => {
-                Ok(Stepped::Done(Box::new(Work::with(self, 1, 0).finish(&result, context)?)))
-            }
+            Next::Finished(result) => match Work::with(self, 1, 0).finish(&result, context)? {
+                End::Model(report) => Ok(Stepped::Done(report)),
+                End::TooLarge(history) => {
+                    self.restart(passes, pass + 1, *history, None, context)?;
+                    Ok(Stepped::Next(pass + 1))
+                }
+            },
         }
+    }
+
+    /// How a clustering went that leaves more than was asked for, with this attempt; none where it does not, or where
+    /// there are to be no more clusters.
+    fn too_large(&self, clusters: usize, error: f64, history: &History) -> Option<History> {
+        let too_large = matches!(self.options.amount, Amount::Error(target) if error > target);
+        (too_large && clusters < self.most_clusters).then(|| {
+            let mut history = history.clone();
+            history.attempts.push(Trial { clusters, mean_lightness_error: error });
+            history
+        })
     }
 
     /// What follows a pass that began with `state`; what the next one begins with is written.
@@ -264,9 +295,7 @@ impl Plan {
         if history.batch.is_none() && self.method(0, deadline).is_done(&history.passes) {
             let error = history.passes.last().map_or(0.0, |pass| pass.mean_lightness_error);
             let clusters = found.nearest.len();
-            let too_large = matches!(self.options.amount, Amount::Error(target) if error > target);
-            if too_large && clusters < self.most_clusters {
-                history.attempts.push(Trial { clusters, mean_lightness_error: error });
+            if let Some(history) = self.too_large(clusters, error, &history) {
                 return Ok(Next::Restart(Box::new(history)));
             }
             let index = self.selection.by_number(&found.index);

@@ -64,7 +64,7 @@ impl Plan {
     /// Where a texel of the tile is not in the other one.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let Some(_lock) = self.model.begin(Stage::Cluster, &self.recipe, context)? else {
-            return self.model.report(Stage::Cluster);
+            return self.model.cluster_report();
         };
         let (tile, other) = (self.model.tile()?, self.from.tile()?);
         let mut clusters = self.from.read_clusters()?;
@@ -84,7 +84,7 @@ impl Plan {
         clusters.index = tile.source.iter().map(cluster).collect::<Result<_>>()?;
         clusters.size = tile.size;
         self.model.write_clusters(&clusters)?;
-        let of_other: Report = self.from.report(Stage::Cluster)?;
+        let of_other = self.from.cluster_report()?;
         let name = self.from.path().file_name().unwrap_or_default().to_string_lossy().into_owned();
         let texels = tile.size.texels() as u64;
         let report = Report {

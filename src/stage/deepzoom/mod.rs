@@ -5,13 +5,13 @@
 //! only tiles that are missing.
 
 mod place;
+pub mod recipe;
 mod verify;
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use btfkit_formats::Direction;
 use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -22,20 +22,18 @@ use crate::picture::deepzoom::cascade::{Cascade, Sink};
 use crate::picture::deepzoom::pyramid::Pyramid;
 use crate::picture::deepzoom::{Encoding, page};
 use crate::run::progress::Counted;
-use crate::run::recipe::METHOD;
+use crate::run::recipe::Recipe;
 use crate::run::shard::Shard;
 use crate::run::{Context, read_ahead};
 use crate::stage::image::{self, Scene, Subject};
 
 use place::PyramidFiles;
+use recipe::PyramidRecipe;
 pub use verify::Pyramidal;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
 pub(crate) const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
-
-/// The member of the state of a finished pyramid that tells what its tiles do not hold.
-const NOTES: &str = "notes";
 
 /// Memory for what does not grow with the picture: the program itself, threads, packers.
 const FIXED_BYTES: u64 = 16 << 20;
@@ -106,17 +104,16 @@ pub fn plan(options: &Options, context: &Context<'_>) -> Result<Plan> {
     };
     let mut scene = Scene::open(&options.picture, context)?;
     scene.expose(options.exposure);
-    let direction = |direction: Direction| json!(direction.degrees());
-    let recipe = json!({
-        "stage": "deepzoom", "method": METHOD,
-        "source": scene.recipe(),
-        "view": direction(view),
-        "light": direction(light),
-        "exposure": options.exposure,
-        "tiles": options.encoding.recipe(),
-        "tile_side": side,
-        "overlap": overlap,
-    });
+    let recipe = PyramidRecipe {
+        source: scene.recipe().clone(),
+        view: view.degrees().into(),
+        light: light.degrees().into(),
+        exposure: options.exposure,
+        tiles: options.encoding,
+        tile_side: side,
+        overlap,
+    };
+    let recipe = recipe.to_value()?;
     place.check(&recipe, context.existing)?;
     let pyramid = Pyramid { size: scene.size(), side, overlap };
     let plan = Plan { scene, pyramid, encoding: options.encoding, place, recipe, shard: options.shard };
@@ -161,8 +158,7 @@ impl Plan {
         context.progress.begin("deepzoom", total, Counted::Items("tiles"));
         let tiles = Tiles { plan: self, context, found: AtomicU64::new(0), written: AtomicU64::new(0) };
         // What the tiles do not hold is found by going through the picture, and kept for those who find them done.
-        let state = self.place.state()?.unwrap_or_default();
-        let kept = state.get(NOTES).and_then(|notes| serde_json::from_value(notes.clone()).ok());
+        let kept = self.place.state()?.and_then(|state| state.notes);
         let notes: Vec<String> = if let Some(notes) = kept.filter(|_| self.is_whole()) {
             tiles.found.store(total, Ordering::Relaxed);
             notes
@@ -211,11 +207,13 @@ impl Plan {
     /// Keeps beside the recipe the checksums of all tiles, by which exchanged ones are found, and what tiles do not
     /// hold.
     fn end(&self, notes: &[String]) -> Result<()> {
-        let mut state = self.place.state()?.unwrap_or_default();
-        let checksums = verify::checksums(&self.pyramid, &self.place)?;
-        state.insert(verify::CHECKSUMS.to_owned(), json!(checksums));
-        state.insert(NOTES.to_owned(), json!(notes));
-        self.place.write_state(state)
+        let mut state = self.place.state()?.ok_or_else(|| {
+            Error::missing(format!("{}: its recipe has gone", self.place.folder().display()))
+                .hint("run the same command again")
+        })?;
+        state.checksums = Some(verify::checksums(&self.pyramid, &self.place)?);
+        state.notes = Some(notes.to_vec());
+        self.place.write_state(&state)
     }
 
     /// Whether every tile is there.

@@ -6,16 +6,16 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
+use super::recipe::State;
 use crate::disk::lock::is_lock;
 use crate::disk::output::{expect_outside_stores, holds, put_in_place};
 use crate::disk::temporary::{self, Temporary};
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::Encoding;
-use crate::run::recipe::Made;
 use crate::run::{Context, Existing, recipe};
-use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE};
+use crate::store::recognise::{PYRAMID_FOLDER as FOLDER_ENDING, PYRAMID_STATE as STATE_FILE};
 use crate::zarr::storage::MappedStorage;
 use crate::zarr::{FORMAT, Store, metadata};
 
@@ -83,7 +83,7 @@ impl PyramidFiles {
             _ => error,
         })?;
         if let Some(found) = state {
-            return Made::of(&found).expect(&self.description, recipe);
+            return found.made().expect(&self.description, recipe);
         }
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
             entry.is_ok_and(|entry| temporary::is_temporary(&entry.path()) || is_lock(&entry.path()))
@@ -112,22 +112,18 @@ impl PyramidFiles {
         let _lock = Store::at(&self.folder).lock("", context)?;
         self.compare(recipe)?;
         MappedStorage::new(&self.folder).sweep()?;
-        if self.folder.join(STATE).exists() {
+        if self.folder.join(STATE_FILE).exists() {
             return Ok(());
         }
-        let state = json!({
-            "kind": "deepzoom", "format": FORMAT, "version": env!("CARGO_PKG_VERSION"),
-            "recipe": recipe, "digest": recipe::digest(recipe),
-        });
-        self.write_state(state.as_object().cloned().unwrap_or_default())
+        self.write_state(&State::new(recipe, recipe::digest(recipe), FORMAT))
     }
 
     /// What the file with the recipe holds; `None` where there is none.
     ///
     /// # Errors
     /// Where it is damaged, or was changed.
-    pub(super) fn state(&self) -> Result<Option<Map<String, Value>>> {
-        let path = self.folder.join(STATE);
+    pub(super) fn state(&self) -> Result<Option<State>> {
+        let path = self.folder.join(STATE_FILE);
         let Some(state) = metadata::read_object(&path)? else { return Ok(None) };
         // The oldest had neither version nor seal.
         let checked = if state.contains_key("format") || state.contains_key("seal") {
@@ -135,24 +131,28 @@ impl PyramidFiles {
         } else {
             metadata::check_digest(&state)
         };
-        checked.map_err(|what| {
+        let damaged = |what: String| {
             Error::input(format!("{}: {what}", path.display()))
                 .hint("make the pyramid anew: under another name, or with --force")
-        })?;
-        Ok(Some(state))
+        };
+        checked.map_err(damaged)?;
+        serde_json::from_value(Value::Object(state)).map(Some).map_err(|error| damaged(error.to_string()))
     }
 
     /// Writes it, sealed, unless it is the same.
-    pub(super) fn write_state(&self, mut state: Map<String, Value>) -> Result<()> {
+    pub(super) fn write_state(&self, state: &State) -> Result<()> {
+        let Ok(Value::Object(mut state)) = serde_json::to_value(state) else {
+            return Err(Error::internal("the state of a pyramid is no JSON object"));
+        };
         let seal = metadata::seal(&state);
         state.insert("seal".to_owned(), json!(seal));
-        metadata::write_object(&self.folder.join(STATE), state)
+        metadata::write_object(&self.folder.join(STATE_FILE), state)
     }
 
     /// Removes another recipe's pyramid.
     fn remove_another(&self, recipe: &Value) -> Result<()> {
         let is_another = self.compare(recipe).is_err_and(|error| error.kind() == crate::ErrorKind::Recipe);
-        if !is_another || !self.folder.join(STATE).is_file() {
+        if !is_another || !self.folder.join(STATE_FILE).is_file() {
             return Ok(());
         }
         Temporary::sweep_beside(&self.folder);
@@ -165,7 +165,7 @@ impl PyramidFiles {
                 _ => {}
             }
         }
-        temporary::remove_folder(&self.folder, |path| is_tile(path) || path == Path::new(STATE))
+        temporary::remove_folder(&self.folder, |path| is_tile(path) || path == Path::new(STATE_FILE))
     }
 
     /// Refuses a page or a description that lies there and is another's, before any work.

@@ -4,29 +4,24 @@ use std::path::{Path, PathBuf};
 
 use btfkit_formats::{Limits, picture};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
+use serde::ser::Error as _;
+use serde::{Serialize, Serializer};
 
-use super::TILE_SIDES;
 use super::place::PyramidFiles;
+use super::recipe::{PyramidRecipe, State};
 use crate::disk::mapped::MappedFile;
 use crate::error::{Error, Result};
 use crate::picture::deepzoom::pyramid::Pyramid;
 use crate::picture::deepzoom::{Encoding, page};
 use crate::run::Context;
 use crate::run::progress::Counted;
+use crate::run::recipe::Recipe;
 use crate::shape::Size;
 use crate::stage::kept::{Kept, bytes_below};
 use crate::stage::verify::report::Report;
 use crate::store::recognise::PYRAMID_FOLDER;
 use crate::zarr::checksums::DIGITS;
 use crate::zarr::metadata;
-
-/// The member of the state of a finished pyramid that holds the checksums of its tiles.
-pub(super) const CHECKSUMS: &str = "checksums";
-
-/// Longest side of a picture.
-const MOST_SIDE: usize = 1 << 24;
 
 const ANEW: &str =
     "delete this file and run the command that made the pyramid again, which writes what is missing";
@@ -52,51 +47,12 @@ pub struct Pyramidal {
     /// Format of the tiles.
     pub tile_format: &'static str,
     /// What it shows, and how.
-    pub recipe: Value,
+    #[serde(serialize_with = "as_stored")]
+    pub recipe: PyramidRecipe,
 }
 
-/// The recipe of a pyramid, as far as its tiles follow from it; the seal covers all of it.
-#[derive(Deserialize)]
-struct Recipe {
-    source: Source,
-    tiles: Tiles,
-    tile_side: usize,
-    overlap: usize,
-}
-
-#[derive(Deserialize)]
-struct Source {
-    size: Option<[usize; 2]>,
-    /// x, y, width, height.
-    window: Option<[i64; 4]>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum Tiles {
-    Png,
-    Jpeg(u8),
-}
-
-impl Recipe {
-    fn pyramid(&self) -> Option<Pyramid> {
-        let [height, width] = match (self.source.window, self.source.size) {
-            (Some([_, _, width, height]), _) => [usize::try_from(height).ok()?, usize::try_from(width).ok()?],
-            (None, size) => size?,
-        };
-        let sound = [height, width].iter().all(|side| (1..=MOST_SIDE).contains(side))
-            && TILE_SIDES.contains(&self.tile_side)
-            && self.overlap <= self.tile_side / 2;
-        let size = Size::new(height, width);
-        sound.then_some(Pyramid { size, side: self.tile_side, overlap: self.overlap })
-    }
-
-    fn encoding(&self) -> Encoding {
-        match self.tiles {
-            Tiles::Png => Encoding::Png,
-            Tiles::Jpeg(quality) => Encoding::Jpeg(quality),
-        }
-    }
+fn as_stored<S: Serializer>(recipe: &PyramidRecipe, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    recipe.to_value().map_err(S::Error::custom)?.serialize(serializer)
 }
 
 /// Checksums of the tiles: for each level, [`DIGITS`] hexadecimal digits for each row of tiles.
@@ -131,8 +87,8 @@ fn open(path: &Path) -> Result<MappedFile> {
 /// A pyramid that is there.
 struct Opened {
     description: PathBuf,
-    state: Map<String, Value>,
-    recipe: Recipe,
+    state: State,
+    recipe: PyramidRecipe,
     pyramid: Pyramid,
     place: PyramidFiles,
 }
@@ -156,10 +112,9 @@ impl Opened {
                 description.display()
             ))
         })?;
-        let recipe = state.get("recipe").cloned().unwrap_or_default();
-        let recipe: Recipe = serde_json::from_value(recipe).map_err(|error| refused(&error.to_string()))?;
-        let pyramid = recipe.pyramid().ok_or_else(|| refused("sizes that no pyramid has"))?;
-        let place = PyramidFiles::new(&description, recipe.encoding())?;
+        let recipe = PyramidRecipe::from_value(&state.recipe).map_err(|what| refused(&what))?;
+        let pyramid = recipe.pyramid().map_err(|what| refused(&what))?;
+        let place = PyramidFiles::new(&description, recipe.tiles)?;
         Ok(Self { description, state, recipe, pyramid, place })
     }
 }
@@ -172,8 +127,8 @@ pub(crate) fn about(path: &Path) -> Result<Pyramidal> {
     let Opened { description, state, recipe, pyramid, place } = Opened::at(path)?;
     Ok(Pyramidal {
         kept: Kept {
-            version: state.get("version").and_then(Value::as_str).unwrap_or_default().to_owned(),
-            layout: state.get("format").and_then(Value::as_u64).unwrap_or(metadata::OLDEST_FORMAT),
+            version: state.version.unwrap_or_default(),
+            layout: state.format.unwrap_or(metadata::OLDEST_FORMAT),
             stored_bytes: bytes_below(place.folder()),
             finished: description.exists(),
         },
@@ -183,8 +138,8 @@ pub(crate) fn about(path: &Path) -> Result<Pyramidal> {
         tiles: pyramid.tiles(),
         tile_side: pyramid.side,
         overlap: pyramid.overlap,
-        tile_format: recipe.encoding().ending(),
-        recipe: state.get("recipe").cloned().unwrap_or_default(),
+        tile_format: recipe.tiles.ending(),
+        recipe,
     })
 }
 
@@ -198,11 +153,11 @@ pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
     report.checked("size", pyramid.size.to_string());
     report.checked("levels", (pyramid.top() + 1).to_string());
     report.checked("tiles", pyramid.tiles().to_string());
-    texts(&pyramid, &place, recipe.encoding(), &mut report)?;
-    let kept = state.get(CHECKSUMS);
-    if kept.is_none() && state.contains_key("format") && report.findings.is_empty() {
+    texts(&pyramid, &place, recipe.tiles, &mut report)?;
+    let kept = state.checksums.as_ref();
+    if kept.is_none() && state.format.is_some() && report.findings.is_empty() {
         report.find(
-            CHECKSUMS,
+            "checksums",
             format!("{}: none are kept", description.display()),
             "run the command that makes the pyramid again; it only ends it",
         );
@@ -230,10 +185,10 @@ pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
             if report.findings.len() > before {
                 continue;
             }
-            let kept = kept.and_then(|kept| kept.get(level as usize)).and_then(Value::as_str);
+            let kept = kept.and_then(|kept| kept.get(level as usize));
             let kept = kept.and_then(|digits| digits.get(row * DIGITS..(row + 1) * DIGITS));
             let found = report.keep("tiles", checksum(&pyramid, &place, level, row))?;
-            if state.contains_key(CHECKSUMS) && kept != found.as_deref() {
+            if state.checksums.is_some() && kept != found.as_deref() {
                 let what = format!(
                     "{}: the checksum of this row of {} tiles is not the one that was kept",
                     place.tile(level, row, 0).display(),

@@ -26,7 +26,7 @@ use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::cluster;
 use crate::store::enlarged::{EnlargeRecipe, Enlarged, Method};
-use crate::store::model::{Model, Stage, index_bytes};
+use crate::store::model::{Model, index_bytes};
 use crate::words::counted;
 pub use verdict::Verdict;
 
@@ -148,7 +148,7 @@ pub struct Report {
 pub fn plan(options: &Options) -> Result<Plan> {
     let model = Model::open(&options.model)?;
     let tile = model.tile()?.size;
-    let clusters: cluster::Report = model.report(Stage::Cluster)?;
+    let clusters = model.cluster_report()?;
     let subject = Subject { model, options: options.clone(), clusters, tile };
     let rule: Box<dyn Rule> = match &options.by {
         By::Paper(by) => Box::new(paper::Paper::open(&subject, by)?),

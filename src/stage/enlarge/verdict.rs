@@ -9,9 +9,7 @@ use crate::likeness::copies::LargestCopy;
 use crate::likeness::verdict::{Tally, Verdict as Counted, WINDOW_SIDE, excess_peak};
 use crate::shape::Size;
 use crate::stage::judge::frontal_pair;
-use crate::stage::tile;
 use crate::store::enlarged::{Enlarged, Method};
-use crate::store::model::Stage;
 
 /// Shares of clusters in common below which rare parts of the material are being lost.
 const LEAST_SHARES: f64 = 0.9;
@@ -72,7 +70,7 @@ impl Subject {
         let black = self.black(&tile)?;
         let tile = picture(self.tile, &tile).part(part);
         let excess_peak = excess_peak(&picture(window.size, &index), &tile);
-        let report: tile::Report = self.model.report(Stage::Tile)?;
+        let report = self.model.tile_report()?;
         let [of_tile, of_plane] =
             [report.size, report.measurement_size].map(|[height, width]| height * width);
         let more = if of_tile as f64 > NEARLY_ALL * of_plane as f64 {

@@ -127,8 +127,8 @@ fn for_each_view(
 ) -> Result<()> {
     let description = measurement.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
-    // Read as texels, then turned.
-    let in_flight = read_ahead::in_flight(context.work_bytes(), 2 * description.view_bytes());
+    // Read as texels, then turned, then encoded.
+    let in_flight = read_ahead::in_flight(context.work_bytes(), VIEW_COPIES * description.view_bytes());
     let read = |view| {
         let texels = measurement.read_reflectance(view, description.size.window())?;
         Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))

@@ -91,7 +91,7 @@ impl Plan {
     /// Fits the field, unless that is done.
     pub fn run(&self, context: &Context<'_>) -> Result<FieldReport> {
         let Some(_lock) = self.model.begin(Stage::Fit, &self.recipe, context)? else {
-            return self.model.report(Stage::Fit);
+            return self.model.field_report();
         };
         context.progress.begin("fit", 1, Counted::Items("field"));
         let tile = self.model.tile()?;

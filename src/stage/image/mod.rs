@@ -1,5 +1,8 @@
 //! Planar pictures of a measurement, a tile or an enlarged index under any light and view, (27).
 
+mod find;
+mod open;
+pub mod recipe;
 mod scene;
 
 use std::ops::Range;
@@ -19,9 +22,10 @@ use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use btfkit_formats::{Direction, Samples};
+pub(crate) use find::{model_of, of_stage};
 use scene::MEASUREMENT_ROWS;
+pub(crate) use scene::plane_rows;
 pub use scene::{Band, Scene};
-pub(crate) use scene::{model_of, of_stage, plane_rows};
 
 /// Memory for what does not grow with a picture: the program itself, packers, buffers.
 const WRITING_BYTES: u64 = 16 << 20;

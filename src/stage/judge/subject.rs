@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::{Plane, Variation};
 use crate::shape::{Area, Size, Window};
 use crate::stage::image::{model_of, of_stage, plane_rows};
 use crate::store::enlarged::{self, CHUNK_SIDE, Enlarged};
+use crate::store::kind_among;
 use crate::store::model::{self, Model, Stage};
-use crate::zarr::Store;
 
 /// Rows and columns of a plane that are made at once.
 const PLANE_SIDE: usize = 512;
@@ -34,9 +32,7 @@ pub(super) struct Texels {
 impl Subject {
     /// Opens what lies at a path, and its model.
     pub(super) fn open(path: &Path, model: Option<&Path>, size: Option<Size>) -> Result<(Self, Model)> {
-        let attributes = Store::at(path).expect_one_of(&[enlarged::KIND, model::KIND])?;
-        let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or("unknown");
-        match (kind, size) {
+        match (kind_among(path, &[enlarged::KIND, model::KIND])?, size) {
             (enlarged::KIND, None) => {
                 let enlarged = Enlarged::open(path)?;
                 let model = model_of(&enlarged, path, model)?;
@@ -66,7 +62,7 @@ impl Subject {
                 "{} is a model, whose plane is endless: say how much of it to judge with --size WIDTHxHEIGHT",
                 path.display()
             ))),
-            _ => Err(Error::input(format!(
+            (kind, _) => Err(Error::input(format!(
                 "{}: got a store of kind {kind}, expected an enlarged index or a model",
                 path.display()
             ))),

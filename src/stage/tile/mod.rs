@@ -11,7 +11,7 @@ pub use choice::Choice;
 pub(crate) use features::features;
 
 use crate::error::{Error, Result};
-use crate::lattice::{Lattice, LatticeChoice, WaveCounts, largest_whole_cells, wave_counts};
+use crate::lattice::{Lattice, LatticeChoice};
 use crate::method::tile::{Features, Patch, SearchRange, Tile, borders_join, cut, seam_visibility, search};
 use crate::run::budget::OWN_BYTES;
 use crate::run::recipe::Recipe;
@@ -20,8 +20,8 @@ use crate::shape::Size;
 use crate::stage::cluster::{expect_measurement, measurement_name};
 use crate::stage::{cluster, fit};
 use crate::store::measurement::{Description, Measurement};
-use crate::store::model::tile::TileRecipe;
 pub use crate::store::model::tile::TileReport as Report;
+use crate::store::model::tile::{TileRecipe, cells};
 use crate::store::model::{Model, Stage};
 use crate::store::origin;
 use features::lattice_of;
@@ -169,7 +169,7 @@ impl Plan {
         let name = measurement_name(&self.model);
         origin::note(&self.model, origin::MEASUREMENT, self.measurement.path(), name.to_str())?;
         let Some(_lock) = begun else {
-            return model.report(Stage::Tile);
+            return model.tile_report();
         };
         let features = features(&self.measurement, context)?;
         let (tile, patch, lattice) = context.compute(|| self.tile(&features))?;
@@ -184,7 +184,7 @@ impl Plan {
             samples: Some(description.sample_type.name().to_owned()),
             measurement_size: [plane.height, plane.width],
             lattice,
-            cells: cells(&lattice, &tile),
+            cells: cells(&lattice, tile.size, tile.wraps),
         };
         model.write_directions(description)?;
         model.write_tile(&tile)?;
@@ -208,10 +208,4 @@ impl Plan {
         let cut = cut(features, search(features, &range, self.seed));
         Ok((cut.tile, Some(cut.patch), lattice))
     }
-}
-
-/// Cycles of the waves of a lattice down and across a tile, as the report has them.
-fn cells(lattice: &Lattice, tile: &Tile) -> Vec<[i32; 2]> {
-    let part = if tile.wraps { Some(tile.size.window()) } else { largest_whole_cells(lattice, tile.size) };
-    part.and_then(|part| wave_counts(lattice, part.size)).map_or_else(Vec::new, |WaveCounts(counts)| counts)
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use serde::Serialize;
 
 use super::report::{Finding, OLDEST_NOTE, consolidated, kept, unfinished};
-use crate::archive::Source;
+use crate::archive::{Source, read_groups};
 use crate::color::Remarkable;
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::progress::Counted;
@@ -78,25 +78,24 @@ pub fn run(
         .filter(|&view| shard.has(view))
         .partition(|&view| measurement.has_view(view) || measurement.obstructed(view));
     context.progress.begin("verify", found.len() as u64, Counted::Items("views"));
-    let copies = if source.is_some() { 4 } else { 2 };
+    let view = description.view_bytes();
+    let unit_bytes = source.map_or(2 * view, |source| 4 * view + source.bytes_beside_image());
     let what = format!(
         "verifying views of {} under {}",
         description.size,
         counted(description.lights.len(), "light")
     );
-    let in_flight = units::in_flight(context, &what, copies * description.view_bytes())?;
+    let in_flight = units::in_flight(context, &what, unit_bytes)?;
     let different = AtomicU64::new(0);
     let views = units::for_each(context, &found, in_flight, |&view| {
         let (damaged, remarkable) = verify_view(measurement, view)?;
         let mut images = Vec::new();
         if let Some(source) = source.filter(|_| damaged.is_empty()) {
-            let lights = 0..description.lights.len();
-            let samples = source.read_images(view, lights.clone())?;
             let expected = Images::new(
                 description.size,
                 description.n_channels(),
                 description.sample_type,
-                vec![(lights, samples)],
+                read_groups(source, view)?,
             )?;
             let (count, lights) = compare(measurement, view, &expected)?;
             different.fetch_add(count, Ordering::Relaxed);

@@ -4,9 +4,7 @@ use super::report::{OLDEST_NOTE, Report, consolidated};
 use crate::error::Result;
 use crate::run::Context;
 use crate::run::progress::Counted;
-use crate::store::model::clusters::ClusterReport;
 use crate::store::model::components::ComponentsReport;
-use crate::store::model::normals::NormalsReport;
 use crate::store::model::{KIND, Model, Stage};
 use crate::words::counted;
 use crate::zarr::metadata::OLDEST_FORMAT;
@@ -58,7 +56,7 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             report.keep("angle coordinates", model.check_coordinates())?;
         }
         Stage::Cluster => {
-            report.keep("report of cluster", model.report::<ClusterReport>(stage))?;
+            report.keep("report of cluster", model.cluster_report())?;
             report.keep("index", model.index())?;
             report.keep("centres", model.centres())?;
             report.keep("representative_texel", model.representative_texels())?;
@@ -79,7 +77,7 @@ fn of_stage(model: &Model, stage: Stage, context: &Context<'_>, report: &mut Rep
             }
         }
         Stage::Normals => {
-            report.keep("report of normals", model.report::<NormalsReport>(stage))?;
+            report.keep("report of normals", model.normals_report())?;
             report.keep("normals", model.normals())?;
         }
         Stage::Fit => {

@@ -1,12 +1,13 @@
 //! How an enlarged index was made, as its attributes say it.
 
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::KIND;
 use crate::error::{Error, Result};
-use crate::run::recipe::Recipe;
+use crate::method::baseline::MOST_TILES;
+use crate::method::coherent::JITTER_ONE;
+use crate::run::recipe::{self, Recipe};
 use crate::store::model::Stage;
 use crate::zarr::Store;
 use crate::zarr::metadata::OLDEST_FORMAT;
@@ -83,6 +84,52 @@ pub struct EnlargeRecipe {
     pub tiles: Option<usize>,
 }
 
+impl EnlargeRecipe {
+    /// Checks that it says what its method needs and nothing that only others know, each within its range.
+    fn check(&self, tile: Option<[usize; 2]>, is_new: bool) -> std::result::Result<(), String> {
+        let rule = self.rule;
+        let most_candidates = tile.map_or(usize::MAX, |[height, width]| height * width);
+        let members = [
+            ("source", rule != Method::Paper, self.source.map(|_| true), "true or false".to_owned()),
+            (
+                "candidates",
+                rule == Method::Paper,
+                self.candidates.map(|count| (1..=most_candidates).contains(&count)),
+                format!("1 to {most_candidates}"),
+            ),
+            (
+                "jitter",
+                rule == Method::Coherent,
+                self.jitter.map(|jitter| jitter <= JITTER_ONE),
+                format!("0 to {JITTER_ONE}"),
+            ),
+            (
+                "tiles",
+                rule == Method::Tiles,
+                self.tiles.map(|count| (1..=MOST_TILES).contains(&count)),
+                format!("1 to {MOST_TILES}"),
+            ),
+        ];
+        for (name, belongs, found, expected) in members {
+            match found {
+                Some(_) if !belongs => return Err(format!("{name}: method {rule:?} has none")),
+                Some(false) => return Err(format!("{name}: expected {expected}")),
+                None if belongs && is_new => return Err(format!("{name}: got none, expected {expected}")),
+                _ => {}
+            }
+        }
+        let joins = |tile: [usize; 2]| self.size.iter().zip(tile).all(|(side, of)| side.is_multiple_of(of));
+        let laid = matches!(rule, Method::Repeat | Method::Tiles);
+        match tile.filter(|tile| self.tileable && laid && !joins(*tile)) {
+            None => Ok(()),
+            Some([height, width]) => Err(format!(
+                "tileable: {}x{} holds no whole tiles of {width}x{height}",
+                self.size[1], self.size[0]
+            )),
+        }
+    }
+}
+
 impl Recipe for EnlargeRecipe {
     const STAGE: &'static str = "enlarge";
 }
@@ -90,8 +137,9 @@ impl Recipe for EnlargeRecipe {
 /// Attributes, as far as they are needed; the seal covers them all.
 #[derive(Deserialize)]
 pub(super) struct Facts {
-    #[serde(deserialize_with = "recipe_of")]
+    #[serde(deserialize_with = "recipe::stored")]
     pub(super) recipe: EnlargeRecipe,
+    pub(super) digest: String,
     pub(super) version: String,
     #[serde(default)]
     pub(super) model_name: Option<String>,
@@ -99,10 +147,6 @@ pub(super) struct Facts {
     pub(super) clusters: Option<usize>,
     /// Rows and columns of the tile; not in the oldest layout.
     pub(super) tile: Option<[usize; 2]>,
-}
-
-fn recipe_of<'de, D: Deserializer<'de>>(stored: D) -> std::result::Result<EnlargeRecipe, D::Error> {
-    EnlargeRecipe::from_value(&Value::deserialize(stored)?).map_err(D::Error::custom)
 }
 
 impl Facts {
@@ -113,8 +157,7 @@ impl Facts {
                 .hint("enlarge anew, under another name")
         };
         let attributes = Value::Object(store.expect(KIND)?);
-        let facts: Self = serde_json::from_value(attributes)
-            .map_err(|error| refused(format!("recipe or what lies beside it: {error}")))?;
+        let facts: Self = serde_json::from_value(attributes).map_err(|error| refused(error.to_string()))?;
         let is_new = store.format() > OLDEST_FORMAT;
         if is_new && (facts.clusters.is_none() || facts.tile.is_none()) {
             return Err(refused("clusters or tile: none".to_owned()));
@@ -125,11 +168,11 @@ impl Facts {
             return Err(refused(format!("clusters: got {clusters}, expected 1 to {MOST_CLUSTERS}")));
         }
         let sides = facts.recipe.size.iter().chain(facts.tile.iter().flatten());
-        match sides.clone().find(|side| !(1..=MOST_SIDE).contains(*side)) {
-            None => Ok(facts),
-            Some(side) => {
-                Err(refused(format!("size or tile: got a side of {side}, expected 1 to {MOST_SIDE}")))
-            }
+        if let Some(side) = sides.clone().find(|side| !(1..=MOST_SIDE).contains(*side)) {
+            return Err(refused(format!("size or tile: got a side of {side}, expected 1 to {MOST_SIDE}")));
         }
+        let checked = facts.recipe.check(facts.tile, is_new);
+        checked.map_err(|what| refused(format!("recipe: {what}")))?;
+        Ok(facts)
     }
 }

@@ -214,6 +214,11 @@ impl Enlarged {
         self.store.format()
     }
 
+    /// Digest of the recipe that made it.
+    pub(crate) fn digest(&self) -> &str {
+        &self.facts.digest
+    }
+
     /// What made it.
     pub fn recipe(&self) -> &EnlargeRecipe {
         &self.facts.recipe

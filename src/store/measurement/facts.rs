@@ -5,11 +5,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::Description;
+use crate::archive::Reading;
+use crate::archive::adapt::Adaptation;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::run::recipe::Recipe;
+use crate::run::recipe::{self, Recipe};
 use crate::zarr::codec::{Chain, MOST_CHANNELS};
-use crate::zarr::metadata::shown;
+use crate::zarr::metadata::{OLDEST_FORMAT, shown};
 use crate::zarr::{Store, samples_named};
 
 /// What a measurement depends on.
@@ -69,7 +71,7 @@ impl ImportRecipe {
 
     /// Compares it with what its measurement is.
     fn check(&self, description: &Description) -> std::result::Result<(), String> {
-        // The codec is not looked at: arrays say themselves how they are packed.
+        // The codec is compared where the arrays have been looked at.
         let found = Self::of(description, Chain::Stock);
         let members = [
             ("size", json!(found.size), json!(self.size)),
@@ -80,19 +82,60 @@ impl ImportRecipe {
             ("views", json!(found.views), json!(self.views)),
             ("lights", json!(found.lights), json!(self.lights)),
         ];
-        match members.iter().find(|(_, found, expected)| !is_near(found, expected)) {
-            None => Ok(()),
-            Some((name, found, expected)) => {
-                Err(format!("{name}: got {}, the recipe says {}", shown(found), shown(expected)))
+        if let Some((name, found, expected)) =
+            members.iter().find(|(_, found, expected)| !is_near(found, expected))
+        {
+            return Err(format!("{name}: got {}, the recipe says {}", shown(found), shown(expected)));
+        }
+        self.how_read().map(drop)
+    }
+
+    /// How the archive was read; the oldest recipes do not say it.
+    ///
+    /// # Errors
+    /// What no reading says, or what is not of this measurement.
+    pub fn how_read(&self) -> std::result::Result<Reading, String> {
+        if self.reading.is_null() {
+            return Ok(Reading::default());
+        }
+        let reading = Reading::parse(&self.reading).map_err(|what| format!("recipe: reading: {what}"))?;
+        let Adaptation { transfer, samples, .. } = reading.adaptation;
+        let said = [
+            ("transfer", json!(transfer), json!(self.transfer)),
+            ("samples", json!(samples.map(|name| SampleType::from(name).name())), json!(self.samples)),
+        ];
+        match said.iter().find(|(_, asked, is)| !asked.is_null() && asked != is) {
+            None => Ok(reading),
+            Some((name, asked, is)) => {
+                Err(format!("recipe: reading: {name}: got {asked}, the samples have {is}"))
             }
+        }
+    }
+
+    /// Compares how chunks are packed with what the arrays say.
+    pub(super) fn check_codec(&self, chain: Chain) -> std::result::Result<(), String> {
+        match self.codec == chain.name() {
+            true => Ok(()),
+            false => Err(format!("recipe: codec: got {:?}, the arrays have {:?}", self.codec, chain.name())),
         }
     }
 }
 
-/// Attributes of the root, as far as they are needed; the seal covers them all.
+/// How samples are meant, beside their transfer curve.
+pub(super) const RADIOMETRY: &str = "apparent reflectance, cosine of the light angle included";
+
+/// Attributes of the root; the seal covers them all.
 #[derive(Deserialize)]
 pub(super) struct Facts {
-    pub(super) recipe: Value,
+    format: u64,
+    radiometry: Option<String>,
+    assumptions: Option<Vec<String>>,
+    /// What the archive says of itself: name and text.
+    #[serde(default, rename = "remarks")]
+    _remarks: Vec<(String, String)>,
+    checksums: Option<Checksums>,
+    #[serde(deserialize_with = "recipe::stored")]
+    pub(super) recipe: ImportRecipe,
     pub(super) digest: String,
     pub(super) transfer: Transfer,
     pub(super) white: f64,
@@ -102,10 +145,43 @@ pub(super) struct Facts {
     samples: Option<String>,
 }
 
+/// Checksums of the shards of each array, of a measurement that is finished.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Checksums {
+    reflectance: String,
+    luminance: String,
+}
+
 impl Facts {
     pub(super) fn read(attributes: &Map<String, Value>) -> std::result::Result<Self, String> {
         let facts: Self = serde_json::from_value(Value::Object(attributes.clone()))
             .map_err(|error| format!("attributes of btfkit: {error}"))?;
+        let there = [
+            ("channels", facts.channels.is_some()),
+            ("samples", facts.samples.is_some()),
+            ("radiometry", facts.radiometry.is_some()),
+            ("assumptions", facts.assumptions.is_some()),
+        ];
+        if facts.format > OLDEST_FORMAT
+            && let Some((name, _)) = there.iter().find(|(_, there)| !there)
+        {
+            return Err(format!(
+                "attribute btfkit.{name}: got none, expected one in layout format {}",
+                facts.format
+            ));
+        }
+        if let Some(found) = facts.radiometry.as_deref().filter(|found| *found != RADIOMETRY) {
+            return Err(format!(
+                "attribute btfkit.radiometry: got {}, expected \"{RADIOMETRY}\"",
+                shown(&json!(found))
+            ));
+        }
+        if let Some(Checksums { reflectance, luminance }) = &facts.checksums
+            && reflectance.len() != luminance.len()
+        {
+            return Err("attribute btfkit.checksums: got lists of two lengths".to_owned());
+        }
         if !(facts.white.is_finite() && facts.white > 0.0) {
             return Err(format!(
                 "attribute btfkit.white: got {}, expected a reflectance above 0",
@@ -152,8 +228,11 @@ impl Facts {
 
     /// The recipe of a measurement, which it must fit.
     pub(super) fn recipe(&self, description: &Description) -> std::result::Result<ImportRecipe, String> {
-        let recipe = ImportRecipe::from_value(&self.recipe).map_err(|what| format!("recipe: {what}"))?;
+        let recipe = self.recipe.clone();
         recipe.check(description)?;
+        if self.assumptions.as_ref().is_some_and(|assumptions| *assumptions != recipe.assumptions) {
+            return Err("attribute btfkit.assumptions: other sentences than the recipe's".to_owned());
+        }
         Ok(recipe)
     }
 }

@@ -33,8 +33,8 @@ use crate::zarr::codec::{Chain, chunk_codecs};
 use crate::zarr::{Array, Layout, Named, Store};
 pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
-use facts::Facts;
 pub use facts::ImportRecipe;
+use facts::{Facts, RADIOMETRY};
 pub(crate) use write::encoded_bytes;
 
 /// The attribute `kind` of a measurement store.
@@ -95,12 +95,11 @@ impl Measurement {
         let stored = recipe.to_value()?;
         expect_outside_stores(path)?;
         let mut store = Store::at(path);
-        let radiometry = "apparent reflectance, cosine of the light angle included";
         let lock = store.begin_by_recipe(
             KIND,
             &stored,
             json!({
-                "radiometry": radiometry, "transfer": description.transfer, "white": description.white,
+                "radiometry": RADIOMETRY, "transfer": description.transfer, "white": description.white,
                 "channels": description.channels, "samples": description.sample_type.name(),
                 "assumptions": recipe.assumptions, "remarks": remarks,
             }),
@@ -167,6 +166,9 @@ impl Measurement {
         let codecs = document.get("codecs").cloned().unwrap_or_default();
         // Where the codecs are none of ours the layout says so.
         let codec = Chain::of(&codecs, &description.chunk()).unwrap_or(Chain::Stock);
+        if Chain::of(&codecs, &description.chunk()).is_some() {
+            recipe.check_codec(codec).map_err(&damaged)?;
+        }
         let layout = reflectance_layout(&description, codec, side)?;
         let reflectance = store.check_document("reflectance", &layout, &document)?;
         let luminance = store.open_array("luminance", &luminance_layout(&description, codec, side)?)?;

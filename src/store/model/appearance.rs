@@ -11,11 +11,14 @@ use serde_json::Map;
 
 use super::{Model, Stage};
 use crate::error::{Error, Result};
-use crate::lattice::{Lattice, WaveCounts};
+use crate::lattice::{Lattice, LatticeChoice, WaveCounts};
 use crate::method::coherent::{Appearance, Basis, FEATURES, INPUTS, LEVELS_MOST, dims_of};
 use crate::run::recipe::Recipe;
 use crate::shape::{Size, Window};
 use crate::zarr::{Layout, Store};
+
+/// Largest peak of an autocorrelation: 1, and what is rounded.
+const LARGEST_PEAK: f64 = 1.001;
 
 /// What an appearance depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -123,9 +126,28 @@ impl Model {
         write(&self.store, appearance)
     }
 
+    /// How the appearance was worked out.
+    ///
+    /// # Errors
+    /// Where it has not been run, or what it says is impossible.
+    pub fn appearance_report(&self) -> Result<AppearanceReport> {
+        let report: AppearanceReport = self.report(Stage::Appearance)?;
+        let recipe: AppearanceRecipe = self.recipe(Stage::Appearance)?;
+        let what = if report.found.parse::<Lattice>().is_err() {
+            format!("found: got {:?}, no lattice", report.found)
+        } else if recipe.lattice.parse::<LatticeChoice>().is_err() {
+            format!("lattice: the recipe says {:?}, no lattice", recipe.lattice)
+        } else if !report.strongest_peak.is_finite() || report.strongest_peak.abs() > LARGEST_PEAK {
+            format!("strongest_peak: got {}, expected at most {LARGEST_PEAK}", report.strongest_peak)
+        } else {
+            return Ok(report);
+        };
+        Err(self.damaged_report(Stage::Appearance, &what))
+    }
+
     /// How the exemplar looks.
     pub fn appearance(&self) -> Result<Appearance> {
-        let report: AppearanceReport = self.report(Stage::Appearance)?;
+        let report = self.appearance_report()?;
         let tile = self.tile_report()?;
         let clusters = self.clusters()?;
         for (name, layout) in arrays(&report, clusters) {

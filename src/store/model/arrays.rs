@@ -1,6 +1,7 @@
 //! The arrays of a stage: which there are, and how they are opened and checked.
 
 use super::appearance::{self, AppearanceReport};
+use super::entries::Entry;
 use super::normals::normals_layout;
 use super::{Model, Stage, clusters, components, field, tile};
 use crate::error::{Error, Result};
@@ -33,12 +34,22 @@ impl Model {
 
     /// Opens an array of a stage.
     pub(super) fn open_array(&self, stage: Stage, name: &str, layout: &Layout<'_>) -> Result<Array> {
+        self.open_array_of(stage, &self.done(stage)?, name, layout)
+    }
+
+    /// The same of a stage whose entry has been read.
+    pub(super) fn open_array_of(
+        &self,
+        stage: Stage,
+        entry: &Entry,
+        name: &str,
+        layout: &Layout<'_>,
+    ) -> Result<Array> {
         let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
             crate::error::ErrorKind::Missing => error.hint(format!("run {} on it again", stage.commands())),
             _ => error,
         })?;
-        let kept = self.done(stage)?.checksums;
-        let Some(kept) = kept else { return Ok(array) };
+        let Some(kept) = &entry.checksums else { return Ok(array) };
         let kept = kept.get(name).map(String::as_str).unwrap_or_default();
         let found = self.store.unless_made_anew(self.store.checksums(&array))?;
         if found == kept {

@@ -22,6 +22,9 @@ use crate::zarr::{Layout, data_type_of, samples_named};
 /// Most clusters: the index is u16.
 const MOST_CLUSTERS: usize = 1 << 16;
 
+/// The lightness of white: no two texels differ by more.
+const LARGEST_LIGHTNESS: f64 = 100.0;
+
 /// Clusters that a narrow index, of u8, can tell apart.
 pub(crate) const NARROW: usize = 256;
 
@@ -167,6 +170,55 @@ pub struct ClusterReport {
     pub measurement_bytes: u64,
 }
 
+impl ClusterReport {
+    /// Checks the parts against each other and, where clusters were found in this tile, against the recipe.
+    fn check(&self, asked: Option<&ClusterRecipe>) -> std::result::Result<(), String> {
+        let clusters = self.clusters;
+        if !(1..=MOST_CLUSTERS).contains(&clusters) {
+            return Err(format!("clusters: got {clusters}, expected 1 to {MOST_CLUSTERS}"));
+        }
+        if self.single_texel_clusters > clusters {
+            return Err(format!("single_texel_clusters: got {} of {clusters}", self.single_texel_clusters));
+        }
+        let batches = self.batches.iter().map(|batch| batch.pass.mean_lightness_error);
+        let errors = [
+            self.representative_lightness_error,
+            self.representative_from_centre,
+            self.representative_from_centre_most,
+        ];
+        let passes = self.passes.iter().chain(&self.sample_passes).map(|pass| pass.mean_lightness_error);
+        let trials = self.trials.iter().map(|trial| trial.mean_lightness_error);
+        let mut all = errors.into_iter().chain(passes).chain(batches).chain(trials);
+        if let Some(error) = all.find(|error| !(0.0..=LARGEST_LIGHTNESS).contains(error)) {
+            return Err(format!("an error of {error}, expected 0 to {LARGEST_LIGHTNESS}"));
+        }
+        let Some(ClusterRecipe { amount, limits, sample, .. }) = asked else { return Ok(()) };
+        if let Amount::Clusters(most) = amount
+            && clusters > *most
+        {
+            return Err(format!("clusters: got {clusters}, the recipe says {most}"));
+        }
+        if !(limits.tolerance.is_finite() && limits.tolerance >= 0.0) {
+            return Err(format!(
+                "tolerance: the recipe says {}, expected a share from 0 on",
+                limits.tolerance
+            ));
+        }
+        if self.passes.is_empty() || self.passes.len() > limits.passes {
+            return Err(format!("passes: got {}, the recipe says 1 to {}", self.passes.len(), limits.passes));
+        }
+        if let Amount::Error(number) | Amount::Ratio(number) = amount
+            && !(number.is_finite() && *number > 0.0)
+        {
+            return Err(format!("amount: the recipe says {number}, expected a number above 0"));
+        }
+        match sample {
+            Some(0) => Err("sample: the recipe says 0 texels".to_owned()),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Why there was no further pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -240,16 +292,39 @@ impl Model {
         })
     }
 
+    /// How the clustering went.
+    ///
+    /// # Errors
+    /// Where it has not been run, or what it says is impossible, or not of these arrays.
+    pub fn cluster_report(&self) -> Result<ClusterReport> {
+        let report: ClusterReport = self.report(Stage::Cluster)?;
+        let asked = self.recipe::<ClusterRecipe>(Stage::Cluster).ok();
+        let damaged = |what: String| self.damaged_report(Stage::Cluster, &what);
+        report.check(asked.as_ref()).map_err(damaged)?;
+        let tile = self.tile_report()?;
+        let (channels, samples) = self.values()?;
+        let pairs: usize = self.directions()?.map(|list| list.len()).iter().product();
+        let brdf = (pairs * channels.len() * samples.bytes()) as u64;
+        let [rows, columns] = tile.measurement_size;
+        let expected = [
+            ("representative_bytes", report.representative_bytes, report.clusters as u64 * brdf),
+            ("index_bytes", report.index_bytes, index_bytes(tile.size().texels(), report.clusters)),
+            ("tile_bytes", report.tile_bytes, tile.size().texels() as u64 * brdf),
+            ("measurement_bytes", report.measurement_bytes, (rows * columns) as u64 * brdf),
+        ];
+        match expected.into_iter().find(|(_, found, expected)| found != expected) {
+            None => Ok(report),
+            Some((name, found, expected)) => {
+                Err(damaged(format!("{name}: got {found}, expected {expected}, as the arrays have")))
+            }
+        }
+    }
+
     /// Number of clusters.
     pub fn clusters(&self) -> Result<usize> {
-        let ClusterReport { clusters, .. } = self.report(Stage::Cluster)?;
-        if (1..=MOST_CLUSTERS).contains(&clusters) {
-            return Ok(clusters);
-        }
-        Err(Error::input(format!(
-            "{}: report of cluster: clusters: got {clusters}, expected 1 to {MOST_CLUSTERS}",
-            self.path().display()
-        )))
+        let report: ClusterReport = self.report(Stage::Cluster)?;
+        report.check(None).map_err(|what| self.damaged_report(Stage::Cluster, &what))?;
+        Ok(report.clusters)
     }
 
     /// The cluster of each tile texel.

@@ -76,14 +76,22 @@ impl Model {
         Ok(self.entries()?.remove(&stage))
     }
 
+    /// The entry of a stage that must be done, which must be the same whenever it is read.
     pub(super) fn done(&self, stage: Stage) -> Result<Entry> {
-        self.store.expect_unchanged()?;
-        let entry = self.entry(stage)?.ok_or_else(|| {
+        self.seen(stage)?.ok_or_else(|| {
             Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
                 .hint(format!("run {} on it first", stage.commands()))
-        })?;
-        self.store.see(stage.name(), &entry.digest);
+        })
+    }
+
+    /// The same of a stage that may not be done yet.
+    pub(super) fn seen(&self, stage: Stage) -> Result<Option<Entry>> {
         self.store.expect_unchanged()?;
+        let entry = self.entry(stage)?;
+        if let Some(entry) = &entry {
+            self.store.see(stage.name(), &entry.digest);
+            self.store.expect_unchanged()?;
+        }
         Ok(entry)
     }
 
@@ -213,7 +221,7 @@ impl Model {
             // Before anything is taken back.
             for folder in arrays.iter().map(|array| self.path().join(array)).filter(|folder| folder.is_dir())
             {
-                expect_own(&folder, is_of_array)?;
+                expect_own(&folder, |path| is_of_array(&folder, path))?;
             }
             for name in later {
                 context.progress.notice(&format!(

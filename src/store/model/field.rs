@@ -17,8 +17,10 @@ use super::{Model, Stage};
 use crate::error::{Error, Result};
 use crate::method::field::fit::car::Prior;
 use crate::method::field::marginals::{Marginals, Matching, NODES};
+use crate::method::field::pyramid;
 use crate::method::field::{self, CarKind, Coordinates, Gains, Level, Surface};
 use crate::run::recipe::Recipe;
+use crate::shape::Size;
 use crate::words::counted;
 use crate::zarr::{Layout, Store};
 
@@ -117,9 +119,35 @@ impl FieldReport {
     }
 }
 
+impl LevelReport {
+    fn check(&self, size: [usize; 2]) -> std::result::Result<(), String> {
+        if !(1..=MOST_SITES).contains(&self.eta) {
+            return Err(format!("got {} sites, expected 1 to {MOST_SITES}", self.eta));
+        }
+        if self.size != size {
+            return Err(format!("size: got {:?}, expected {size:?}, that of the tile's pyramid", self.size));
+        }
+        let numbers = [
+            ("gain", self.gain, 0.0),
+            ("log_evidence", self.log_evidence, f64::NEG_INFINITY),
+            ("radius", self.radius, 0.0),
+            ("prior_v_xx", self.prior_v_xx, 0.0),
+            ("prior_v_yy", self.prior_v_yy, 0.0),
+            ("prior_beta", self.prior_beta, 0.0),
+            ("prior_degrees", self.prior_degrees, 0.0),
+        ];
+        match numbers.into_iter().find(|(_, found, least)| !(found.is_finite() && found >= least)) {
+            None => Ok(()),
+            Some((name, found, least)) => {
+                Err(format!("{name}: got {found}, expected a number from {least} on"))
+            }
+        }
+    }
+}
+
 impl FieldReport {
     /// Checks the report against the recipe, which decides what is fitted.
-    fn check(&self, recipe: &FitRecipe) -> std::result::Result<(), String> {
+    fn check(&self, recipe: &FitRecipe, tile: Size) -> std::result::Result<(), String> {
         for (name, found, expected) in [
             ("mrf", json!(self.mrf), json!(recipe.mrf)),
             ("field", json!(self.field), json!(recipe.field)),
@@ -135,12 +163,14 @@ impl FieldReport {
         {
             return Err(format!("got {}, the recipe says {levels:?}", counted(self.levels.len(), "level")));
         }
-        match self.levels.iter().position(|level| !(1..=MOST_SITES).contains(&level.eta)) {
-            None => Ok(()),
-            Some(k) => {
-                Err(format!("level {k}: got {} sites, expected 1 to {MOST_SITES}", self.levels[k].eta))
-            }
+        if !(self.autocovariance_error.is_finite() && self.autocovariance_error >= 0.0) {
+            return Err(format!("autocovariance_error: got {}", self.autocovariance_error));
         }
+        let sizes = pyramid::sizes(tile.height, tile.width, self.levels.len());
+        for (k, (level, expected)) in self.levels.iter().zip(sizes).enumerate() {
+            level.check(expected).map_err(|what| format!("level {k}: {what}"))?;
+        }
+        Ok(())
     }
 
     fn channels(&self) -> usize {
@@ -216,10 +246,22 @@ impl Model {
         write(&self.store, surface)
     }
 
+    /// How the fit went.
+    ///
+    /// # Errors
+    /// Where it has not been run, or what it says is impossible, or not by its recipe.
+    pub fn field_report(&self) -> Result<FieldReport> {
+        let report: FieldReport = self.report(Stage::Fit)?;
+        let tile = self.tile_report()?.size();
+        report
+            .check(&self.recipe(Stage::Fit)?, tile)
+            .map_err(|what| self.damaged_report(Stage::Fit, &what))?;
+        Ok(report)
+    }
+
     /// The random field model.
     pub fn surface(&self) -> Result<Surface> {
-        let report: FieldReport = self.report(Stage::Fit)?;
-        report.check(&self.recipe(Stage::Fit)?).map_err(|what| self.damaged_report(Stage::Fit, &what))?;
+        let report = self.field_report()?;
         for (name, layout) in arrays(&report) {
             self.open_array(Stage::Fit, &name, &layout)?;
         }
@@ -285,6 +327,15 @@ fn read(store: &Store, report: &FieldReport) -> Result<Surface> {
             .context(store.path().display())
             .hint("the field is damaged: make the model anew, under another name")
     })?;
+    if let Some(k) = report.levels.iter().zip(&field.levels).position(|(told, level)| told.gain != level.gain)
+    {
+        let (found, expected) = (report.levels[k].gain, field.levels[k].gain);
+        return Err(Error::input(format!(
+            "{}: report of fit: level {k}: gain: got {found}, mrf/gain has {expected}",
+            store.path().display()
+        ))
+        .hint("make the model anew, under another name"));
+    }
     let read_marginals = |matching| {
         let values = store.read_array::<f32>("mrf/marginals", &marginals_layout())?;
         let table = values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect();

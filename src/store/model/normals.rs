@@ -39,6 +39,29 @@ pub struct NormalsReport {
 }
 
 impl Model {
+    /// How the estimation of normals went.
+    ///
+    /// # Errors
+    /// Where it has not been run, or what it says is impossible.
+    pub fn normals_report(&self) -> Result<NormalsReport> {
+        let report: NormalsReport = self.report(Stage::Normals)?;
+        let _: NormalsRecipe = self.recipe(Stage::Normals)?;
+        let [views, lights] = self.directions()?.map(|list| list.len());
+        let length = report.mean.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let what = if report.view >= views {
+            format!("view: got {} of {views}", report.view)
+        } else if report.lights != lights {
+            format!("lights: got {}, expected {lights}", report.lights)
+        } else if !(0.0..=1.0 + f64::from(UNIT_TOLERANCE)).contains(&length) {
+            format!("mean: got {:?}, no mean of unit vectors", report.mean)
+        } else if !(0.0..=180.0).contains(&report.spread_deg) {
+            format!("spread_deg: got {}, expected 0 to 180", report.spread_deg)
+        } else {
+            return Ok(report);
+        };
+        Err(self.damaged_report(Stage::Normals, &what))
+    }
+
     /// Writes the normal map [y, x, 3], unit vectors.
     pub(crate) fn write_normals(&self, size: Size, normals: &[[f32; 3]]) -> Result<()> {
         self.store.write("normals", &normals_layout(size), normals.as_flattened())

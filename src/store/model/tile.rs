@@ -7,13 +7,15 @@ use serde::{Deserialize, Serialize};
 use super::{Model, Stage};
 use crate::color::Transfer;
 use crate::error::Result;
-use crate::lattice::Lattice;
+use crate::lattice::{Lattice, WaveCounts, largest_whole_cells, wave_counts};
 use crate::method::tile::{Patch, Tile};
 use crate::method::value::triangulation::triangulate;
 use crate::run::recipe::Recipe;
 use crate::shape::Size;
 use crate::store::directions;
 use crate::store::measurement::Description;
+use crate::zarr::codec::MOST_CHANNELS;
+use crate::zarr::metadata::OLDEST_FORMAT;
 use crate::zarr::{Layout, samples_named};
 
 /// Longest side of a plane.
@@ -83,8 +85,8 @@ impl TileReport {
         Some((self.channels.clone()?, samples))
     }
 
-    /// Checks the parts against each other and against the recipe.
-    pub(super) fn check(&self, recipe: &TileRecipe) -> std::result::Result<(), String> {
+    /// Checks the parts against each other and against the recipe, in a model of this layout.
+    fn check(&self, recipe: &TileRecipe, format: u64) -> std::result::Result<(), String> {
         let sides = self.size.iter().chain(&self.measurement_size);
         if !sides.clone().all(|side| (1..=MOST_SIDE).contains(side)) {
             return Err(format!("got sides {:?}, expected 1 to {MOST_SIDE}", sides.collect::<Vec<_>>()));
@@ -99,7 +101,30 @@ impl TileReport {
             None if self.size != self.measurement_size => {
                 return Err("got no patch of a tile that is not the whole measurement".to_owned());
             }
+            Some(patch) if !patch.lies_within(self.measurement_size) => {
+                let [rows, columns] = self.measurement_size;
+                return Err(format!("patch: got {patch:?}, expected one within {columns}x{rows}"));
+            }
             _ => {}
+        }
+        if let Some((name, seen)) =
+            [("seam_visibility", self.seam_visibility), ("uncut_visibility", self.uncut_visibility)]
+                .into_iter()
+                .find(|(_, seen)| !(seen.is_finite() && *seen >= 0.0))
+        {
+            return Err(format!("{name}: got {seen}, expected a number from 0 on"));
+        }
+        if format > OLDEST_FORMAT && self.values().is_none() {
+            return Err("channels, samples: got none, or no type that samples come in".to_owned());
+        }
+        if let Some((channels, _)) = self.values()
+            && !(1..=MOST_CHANNELS).contains(&channels.len())
+        {
+            return Err(format!("channels: got {} of them, expected 1 to {MOST_CHANNELS}", channels.len()));
+        }
+        let expected = cells(&self.lattice, self.size(), self.wraps);
+        if !self.cells.is_empty() && self.cells != expected {
+            return Err(format!("cells: got {:?}, expected {expected:?}, those of the lattice", self.cells));
         }
         let wraps = match recipe.tile.as_str() {
             "none" => Some(false),
@@ -111,6 +136,12 @@ impl TileReport {
         }
         Ok(())
     }
+}
+
+/// Cycles of the waves of a lattice down and across a tile (of one that does not wrap, its largest part of whole cells).
+pub(crate) fn cells(lattice: &Lattice, tile: Size, wraps: bool) -> Vec<[i32; 2]> {
+    let part = if wraps { Some(tile.window()) } else { largest_whole_cells(lattice, tile) };
+    part.and_then(|part| wave_counts(lattice, part.size)).map_or_else(Vec::new, |WaveCounts(counts)| counts)
 }
 
 /// The arrays of a tile.
@@ -133,9 +164,11 @@ impl Model {
     ///
     /// # Errors
     /// Where there is no tile yet, or its parts do not fit together.
-    pub(crate) fn tile_report(&self) -> Result<TileReport> {
+    pub fn tile_report(&self) -> Result<TileReport> {
         let report: TileReport = self.report(Stage::Tile)?;
-        report.check(&self.recipe(Stage::Tile)?).map_err(|what| self.damaged_report(Stage::Tile, &what))?;
+        report
+            .check(&self.recipe(Stage::Tile)?, self.format())
+            .map_err(|what| self.damaged_report(Stage::Tile, &what))?;
         Ok(report)
     }
 
@@ -153,25 +186,22 @@ impl Model {
 
     /// View directions and light directions.
     pub fn directions(&self) -> Result<[Vec<Direction>; 2]> {
-        let read = |dimension: &str| -> Result<Vec<Direction>> {
-            let directions = directions::read(&self.store, dimension)?;
-            self.expect_direction_arrays(dimension, directions.len(), |name| name.ends_with("direction"))?;
-            Ok(directions)
-        };
-        Ok([read("view")?, read("light")?])
+        let directions = [directions::read(&self.store, "view")?, directions::read(&self.store, "light")?];
+        self.expect_direction_arrays(&directions, |name| name.ends_with("direction"))?;
+        Ok(directions)
     }
 
-    /// Checks the arrays of a dimension against the checksums that were kept; before the tile is done there are none.
+    /// Checks arrays of the directions against the checksums that were kept; before the tile is done there are none.
     fn expect_direction_arrays(
         &self,
-        dimension: &str,
-        count: usize,
+        directions: &[Vec<Direction>; 2],
         wanted: impl Fn(&str) -> bool,
     ) -> Result<()> {
-        if self.has(Stage::Tile)? {
-            for (name, layout) in directions::layouts(dimension, count, self.store.format()) {
+        let Some(entry) = self.seen(Stage::Tile)? else { return Ok(()) };
+        for (dimension, directions) in ["view", "light"].into_iter().zip(directions) {
+            for (name, layout) in directions::layouts(dimension, directions.len(), self.store.format()) {
                 if wanted(&name) {
-                    self.open_array(Stage::Tile, &name, &layout)?;
+                    self.open_array_of(Stage::Tile, &entry, &name, &layout)?;
                 }
             }
         }
@@ -183,11 +213,11 @@ impl Model {
     /// # Errors
     /// Where they are not.
     pub(crate) fn check_coordinates(&self) -> Result<()> {
-        for (dimension, directions) in ["view", "light"].into_iter().zip(self.directions()?) {
-            directions::check_coordinates(&self.store, dimension, &directions)?;
-            self.expect_direction_arrays(dimension, directions.len(), |_| true)?;
+        let directions = self.directions()?;
+        for (dimension, directions) in ["view", "light"].into_iter().zip(&directions) {
+            directions::check_coordinates(&self.store, dimension, directions)?;
         }
-        Ok(())
+        self.expect_direction_arrays(&directions, |_| true)
     }
 
     /// Triangles of the views and of the lights: numbers of three directions each.

@@ -95,7 +95,7 @@ impl Slurm {
                 "  {:<9} {} for each material, {} MiB and at most {} each",
                 job.name(),
                 counted(job.tasks(), "task"),
-                job.memory_mib(),
+                job.asked_mib(),
                 counted(job.minutes() as usize, "minute")
             ));
         }

@@ -2,7 +2,6 @@
 //! progress, and stopping on request.
 
 pub mod budget;
-pub mod partial;
 pub mod progress;
 pub(crate) mod read_ahead;
 pub mod recipe;

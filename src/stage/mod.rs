@@ -17,6 +17,7 @@ pub(crate) mod kept;
 pub mod loss;
 pub mod normals;
 pub mod pack;
+pub mod partial;
 pub mod render;
 pub mod sample;
 pub mod slurm;

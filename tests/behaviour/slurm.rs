@@ -117,7 +117,7 @@ fn jobs_for_a_material_with_an_awkward_name_make_what_one_process_makes() {
     assert_eq!(asked.matches("--account=lab --comment=it's a\n").count(), all.len());
     assert_eq!(asked.matches("--array=0-2 ").count(), 3, "{asked}");
     // Once more, everything is found done.
-    succeed(&mut stubs.with(Command::new("bash")).arg("submit.sh").current_dir(&jobs));
+    succeed(stubs.with(Command::new("bash")).arg("submit.sh").current_dir(&jobs));
     assert_eq!(stubs.read(".codes"), "");
     assert_same(&store(".model.zarr"), &fixture().model());
 }

@@ -10,12 +10,12 @@ use serde_json::json;
 
 use crate::color::{ciede2000, lab};
 use crate::error::{Error, Result};
-use crate::run::partial::{Partial, Sharing};
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
+use crate::stage::partial::{Partial, Sharing};
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::words::counted;

@@ -135,7 +135,7 @@ impl Job {
     }
 
     /// Memory that Slurm is asked for, MiB a task.
-    pub fn memory_mib(&self) -> u64 {
+    pub fn asked_mib(&self) -> u64 {
         self.need.slurm_mib
     }
 

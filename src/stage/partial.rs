@@ -15,9 +15,7 @@ use crate::disk::temporary::{Temporary, write_file};
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::run::shard::Shard;
-
-/// The most bytes that the result of a unit takes.
-const MOST_BYTES: u64 = 1 << 20;
+use crate::zarr::metadata;
 
 /// Where results of units are kept, and what a run does about them.
 #[derive(Clone, Debug)]
@@ -59,12 +57,8 @@ impl Partial {
 
     /// The result of a unit; `None` where it is not there, or damaged: then it has to be made again.
     pub(crate) fn read<T: DeserializeOwned>(&self, unit: usize) -> Option<T> {
-        let path = self.path(unit);
-        let file = path.metadata().ok()?;
-        if !file.is_file() || file.len() > MOST_BYTES {
-            return None;
-        }
-        let mut document: Value = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
+        let bytes = metadata::read_file(&self.path(unit)).ok()??;
+        let mut document: Value = serde_json::from_slice(&bytes).ok()?;
         let value = document.get_mut("value")?.take();
         let seal = document.get("digest")?.as_str()?;
         if seal != self.seal(unit, &value) {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use btfkit_formats::npy::{self, Beside};
 use btfkit_formats::utia::Order;
 use btfkit_formats::{
-    Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
+    ContainerKind, Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
 };
 
 use super::adapt::Type;
@@ -19,9 +19,6 @@ use crate::run::Context;
 /// Groups that the lights of a view are read in: enough for some threads, few enough that what a group has
 /// in common (a block of factors, say) is worked out seldom.
 const GROUPS: usize = 8;
-
-/// The beginning of every `.npy` file.
-const NPY_MAGIC: &[u8] = b"\x93NUMPY";
 
 /// What to do where a file does not name its directions: UTIA's have an order of images.
 const ORDER_OF_IMAGES: &str = "--order says in which order its images are: ubo81 or uniform";
@@ -44,37 +41,19 @@ impl Recognised {
     }
 }
 
-/// A kind of container.
-struct Kind {
-    /// With its article.
-    name: &'static str,
-    is: fn(&[u8]) -> bool,
-    open: fn(&Path, &Options, &Limits) -> Result<Recognised>,
-}
-
-/// Every container that is read; the first whose beginning fits counts.
-const KINDS: [Kind; 6] = [
-    Kind { name: "a Bonn BTF archive", is: |head| bonn::recognise(head).is_some(), open: open_bonn },
-    Kind { name: "an MLVQ database", is: mlvq::recognise, open: open_mlvq },
-    Kind { name: "a UTIA BIG archive", is: big::recognise, open: open_big },
-    Kind { name: "a MIF archive", is: mif::recognise, open: open_mif },
-    Kind { name: "a numpy array", is: |head| head.starts_with(NPY_MAGIC), open: open_npy },
-    Kind { name: "an HDF5 file", is: crate::archive::hdf5::recognise, open: open_hdf5 },
-];
-
-fn kind_of(head: &[u8]) -> Option<&'static Kind> {
-    KINDS.iter().find(|kind| (kind.is)(head))
-}
-
-/// What a container is by its first bytes, with its article; `None` if it is none.
-pub fn name_of(head: &[u8]) -> Option<&'static str> {
-    kind_of(head).map(|kind| kind.name)
-}
-
 /// Opens a file that is a container by its first bytes; `None` if it is none.
 pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
     let head = files::read_head(path, HEAD_BYTES)?;
-    kind_of(&head).map(|kind| (kind.open)(path, options, limits)).transpose()
+    let Some(kind) = ContainerKind::recognise(&head) else { return Ok(None) };
+    let open = match kind {
+        ContainerKind::Bonn => open_bonn,
+        ContainerKind::Mlvq => open_mlvq,
+        ContainerKind::Big => open_big,
+        ContainerKind::Mif => open_mif,
+        ContainerKind::Npy => open_npy,
+        ContainerKind::Hdf5 => open_hdf5,
+    };
+    open(path, options, limits).map(Some)
 }
 
 fn open_bonn(path: &Path, options: &Options, limits: &Limits) -> Result<Recognised> {

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::container::name_of;
+use btfkit_formats::ContainerKind;
+
 use super::files;
 use crate::error::{Error, Result};
 
@@ -62,8 +63,9 @@ pub(super) fn of_containers(paths: &[PathBuf]) -> Option<Error> {
 fn container(file: PathBuf) -> Option<(PathBuf, &'static str)> {
     let name = file.to_string_lossy();
     let is_list = [".views.npy", ".lights.npy"].iter().any(|ending| name.ends_with(ending));
-    let what = name_of(&files::read_head(&file, super::HEAD_BYTES).ok()?).filter(|_| !is_list)?;
-    Some((file, what))
+    let head = files::read_head(&file, super::HEAD_BYTES).ok()?;
+    let kind = ContainerKind::recognise(&head).filter(|_| !is_list)?;
+    Some((file, kind.name()))
 }
 
 fn direct_files(folder: &Path) -> Option<Vec<PathBuf>> {

@@ -27,8 +27,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 
-pub use container::name_of;
-
 use crate::color::Remarkable;
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::{Context, recipe};

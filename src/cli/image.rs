@@ -56,7 +56,7 @@ enum BitsName {
 enum What {
     /// The material under a light
     Appearance,
-    /// Cluster numbers in false colours
+    /// Clusters in false colours: blue for dark ones, over green to yellow for light ones
     Index,
     /// The normal map
     Normals,

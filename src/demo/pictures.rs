@@ -176,8 +176,8 @@ impl Workshop {
             Subject::TileRepeated => measured(tile)?.repeated(repeats),
             Subject::Clusters => {
                 let [view, light] = Lit::REFERENCE.directions();
-                let colors = cluster_colors(&self.model, view, light)?;
-                false_color::index_by_lightness(tile.size, &self.tile_index, &colors)
+                let colors = false_color::by_lightness(&cluster_colors(&self.model, view, light)?);
+                Picture::display(tile.size, look_up(tile.size, &self.tile_index, &colors)?.pixels)
             }
             Subject::Modelled => self.modelled(tile.size, &self.tile_index, Lit::REFERENCE)?,
             Subject::Difference => {

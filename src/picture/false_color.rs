@@ -1,22 +1,11 @@
 //! Pictures of what is not light: cluster numbers, normals, seams, differences.
 
 use crate::picture::Picture;
-use crate::random::Hash;
 use crate::shape::Size;
 
-/// Each cluster in a colour of its own, hashed from its number.
-pub fn index(size: Size, index: &[u16]) -> Picture {
-    let hash = Hash::new(0, u32::from_be_bytes(*b"hues"));
-    let color = |&cluster: &u16| {
-        let [hue, saturation, value, _] = hash.uniforms(u32::from(cluster), 0, 0);
-        hsv(hue, 0.35 + 0.5 * saturation, 0.5 + 0.5 * value)
-    };
-    Picture::display(size, index.iter().map(color).collect())
-}
-
-/// Each cluster in a colour that says how light it is among all of them, from dark blue over green to light yellow.
-/// `colors` are the linear RGB of the clusters.
-pub(crate) fn index_by_lightness(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Picture {
+/// A colour for each cluster that says how light it is among all of them, from dark blue over green to light yellow.
+/// `colors` are the linear RGB of the clusters, results display RGB.
+pub(crate) fn by_lightness(colors: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let luminance = |cluster: usize| {
         let [red, green, blue] = colors[cluster];
         0.2126 * red + 0.7152 * green + 0.0722 * blue
@@ -28,8 +17,7 @@ pub(crate) fn index_by_lightness(size: Size, index: &[u16], colors: &[[f32; 3]])
         let at = rank as f64 / colors.len().max(2).saturating_sub(1) as f64;
         ramp[cluster] = hsv(0.68 - 0.53 * at, 0.85 - 0.35 * at, 0.35 + 0.65 * at);
     }
-    let color = |&cluster: &u16| ramp.get(usize::from(cluster)).copied().unwrap_or_default();
-    Picture::display(size, index.iter().map(color).collect())
+    ramp
 }
 
 /// Normals as (n + 1) / 2: x to the right in red, y upwards in green, z towards the viewer in blue.
@@ -85,9 +73,9 @@ mod tests {
     fn lighter_clusters_have_lighter_colours() {
         // Green counts more than red, and red more than blue.
         let colors = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3], [1.0, 0.0, 0.0]];
-        let picture = index_by_lightness(Size::new(1, 4), &[2, 1, 3, 0], &colors);
+        let ramp = by_lightness(&colors);
         let lightest: Vec<f32> =
-            picture.pixels.iter().map(|pixel| pixel.iter().copied().fold(0.0, f32::max)).collect();
+            [2, 1, 3, 0].map(|cluster: usize| ramp[cluster].iter().copied().fold(0.0, f32::max)).to_vec();
         assert!(lightest.is_sorted_by(|a, b| a < b), "{lightest:?}");
     }
 }

@@ -4,10 +4,10 @@
 use std::io::Read;
 use std::path::Path;
 
+use btfkit_formats::ContainerKind;
 use serde_json::{Value, json};
 
 use super::{enlarged, measurement, model};
-use crate::archive::name_of;
 use crate::disk::lock::is_lock;
 use crate::disk::mapped::{open, special};
 use crate::disk::temporary::is_temporary;
@@ -102,7 +102,7 @@ pub(super) fn other(path: &Path) -> Result<Option<Other>> {
 fn of_file(head: &[u8]) -> Other {
     let starts = |magic: &[u8]| head.starts_with(magic);
     let zip = (starts(b"PK\x03\x04") || starts(b"PK\x05\x06")).then_some("a zip archive");
-    let known = zip.or_else(|| name_of(head));
+    let known = zip.or_else(|| ContainerKind::recognise(head).map(ContainerKind::name));
     if let Some(what) = known {
         return Other { what: format!("an archive ({what})"), use_it: Use::Import };
     }

@@ -26,19 +26,6 @@ pub use archive::Archive;
 #[cfg(feature = "hdf5")]
 pub use writer::Writer;
 
-/// First bytes of the superblock.
-const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
-
-/// Where a superblock may begin, after a block of the user's own: 0, or 512 times a power of two.
-fn superblock_places() -> impl Iterator<Item = usize> {
-    std::iter::once(0).chain((9..usize::BITS).map(|power| 1 << power))
-}
-
-/// Whether a file that begins with these bytes (or has all of them) is HDF5.
-pub fn recognise(bytes: &[u8]) -> bool {
-    superblock_places().any(|at| bytes.get(at..).is_some_and(|rest| rest.starts_with(SIGNATURE)))
-}
-
 /// The error of a program built without HDF5 that meets such a file.
 #[cfg(not(feature = "hdf5"))]
 pub(crate) fn not_built_in(path: &std::path::Path) -> crate::Error {
@@ -46,26 +33,10 @@ pub(crate) fn not_built_in(path: &std::path::Path) -> crate::Error {
         .hint("install HDF5's headers (Debian: libhdf5-dev) and build with `cargo build --release --features hdf5`")
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "hdf5")))]
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_signature_is_found_after_a_block_of_the_users_own_and_nowhere_else() {
-        for at in [0, 512, 1024, 4096] {
-            let mut file = vec![0; at];
-            file.extend(SIGNATURE);
-            assert!(recognise(&file), "{at}");
-            assert!(!recognise(&file[..file.len() - 1]), "{at}");
-        }
-        for at in [1, 256, 768] {
-            let mut file = vec![0; at];
-            file.extend(SIGNATURE);
-            assert!(!recognise(&file), "{at}");
-        }
-    }
-
-    #[cfg(not(feature = "hdf5"))]
     #[test]
     fn without_the_feature_the_error_says_how_to_build_with_it() {
         let error = not_built_in(std::path::Path::new("a.h5"));

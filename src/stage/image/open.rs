@@ -1,5 +1,7 @@
 //! Opens what is to be pictured: a measurement, a model's tile or its endless plane, an enlarged index.
 
+use btfkit_formats::Direction;
+
 use super::find::{measurement_of, model_of, of_stage};
 use super::recipe::{Endless, Packed, PlaneValues, SceneRecipe, Stored, ValuesName, window_of};
 use super::scene::{Scene, Source};
@@ -202,12 +204,21 @@ fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Resu
             of_measured_tile(&measurement, &tile, view, light, context)
         }
         (Subject::Index, _) => {
-            Ok(false_color::index(tile.size, &of_stage(model, Stage::Cluster, Model::index)?))
+            let index = of_stage(model, Stage::Cluster, Model::index)?;
+            let pixels = look_up(tile.size, &index, &colors_by_lightness(model)?)?.pixels;
+            Ok(Picture::display(tile.size, pixels))
         }
         (Subject::Normals, _) => {
             Ok(false_color::normals(tile.size, &of_stage(model, Stage::Normals, Model::normals)?))
         }
     }
+}
+
+/// False colours of a model's clusters, by how light they are when looked at and lit from above.
+fn colors_by_lightness(model: &Model) -> Result<Vec<[f32; 3]>> {
+    let above = Direction::from_degrees(0.0, 0.0);
+    let colors = of_stage(model, Stage::Cluster, |model| cluster_colors(model, above, above))?;
+    Ok(false_color::by_lightness(&colors))
 }
 
 fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Context<'_>) -> Result<Scene> {
@@ -247,7 +258,10 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
             directions = of_model(&model, options)?;
             Source::Clusters { enlarged, colors }
         }
-        Subject::Index => Source::Index(enlarged),
+        Subject::Index => {
+            let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
+            Source::Index { colors: colors_by_lightness(&model)?, enlarged }
+        }
         Subject::Normals if enlarged.has_normals() => Source::Normals(enlarged),
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;

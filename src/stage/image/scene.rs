@@ -54,7 +54,11 @@ pub(super) enum Source {
         enlarged: Enlarged,
         colors: Vec<[f32; 3]>,
     },
-    Index(Enlarged),
+    /// An enlarged index, by false colours of clusters.
+    Index {
+        enlarged: Enlarged,
+        colors: Vec<[f32; 3]>,
+    },
     Normals(Enlarged),
     /// An enlarged index, by the pixels of the tile's texels.
     Sources {
@@ -89,7 +93,7 @@ impl Source {
                 (measurement.views_done(), measurement.description().views.len(), "views")
             }
             Self::Clusters { enlarged, .. }
-            | Self::Index(enlarged)
+            | Self::Index { enlarged, .. }
             | Self::Normals(enlarged)
             | Self::Sources { enlarged, .. } => {
                 (enlarged.shards_done(), enlarged.shards().texels(), "shards")
@@ -174,7 +178,7 @@ impl Scene {
     pub fn meaning(&self) -> Meaning {
         match &self.source {
             Source::Tile(tile) | Source::Sources { tile, .. } | Source::Plane { tile, .. } => tile.meaning,
-            Source::Index(_) | Source::Normals(_) => Meaning::Display,
+            Source::Index { .. } | Source::Normals(_) => Meaning::Display,
             Source::Measurement { .. } | Source::Clusters { .. } => Meaning::Linear,
         }
     }
@@ -199,7 +203,7 @@ impl Scene {
             Source::Measurement { appearance, .. } => {
                 appearance.terms.iter_mut().for_each(|(.., weight)| *weight *= exposure);
             }
-            Source::Index(_) | Source::Normals(_) => {}
+            Source::Index { .. } | Source::Normals(_) => {}
         }
     }
 
@@ -218,7 +222,7 @@ impl Scene {
                 Pixels::Own(mixed(measurement, appearance, decoder, window, &self.beyond, context)?)
             }
             Source::Tile(picture) => Pixels::Own(picture.part(window).pixels),
-            Source::Clusters { enlarged, colors } => {
+            Source::Clusters { enlarged, colors } | Source::Index { enlarged, colors } => {
                 let index = enlarged.read(window)?;
                 expect_colors(&index, colors)?;
                 Pixels::Clusters { index, colors }
@@ -232,9 +236,6 @@ impl Scene {
                     )));
                 }
                 Pixels::Texels { source, tile: &tile.pixels }
-            }
-            Source::Index(enlarged) => {
-                Pixels::Own(false_color::index(window.size, &enlarged.read(window)?).pixels)
             }
             Source::Normals(enlarged) => {
                 let normals = enlarged.read_normals(window)?.unwrap_or_default();
@@ -289,8 +290,7 @@ impl Scene {
                 measurement.description().texel_bytes() + size_of::<[f64; 3]>() + PIXEL
             }
             Source::Tile(_) => PIXEL,
-            Source::Clusters { .. } => size_of::<u8>() + size_of::<u16>(),
-            Source::Index(_) => size_of::<u8>() + size_of::<u16>() + PIXEL,
+            Source::Clusters { .. } | Source::Index { .. } => size_of::<u8>() + size_of::<u16>(),
             Source::Normals(_) => 3 * PIXEL,
             Source::Sources { .. } => 2 * size_of::<u32>(),
             Source::Plane { .. } => PLANE_TEXEL_BYTES,

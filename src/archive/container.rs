@@ -10,11 +10,11 @@ use btfkit_formats::{
     ContainerKind, Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
 };
 
-use super::adapt::Type;
 use super::{HEAD_BYTES, Options, Source, digest_of, files, read_beside};
 use crate::disk::mapped::MappedFile;
 use crate::error::{BEGIN_AGAIN, Error, Result};
 use crate::run::Context;
+use crate::store::measurement::Type;
 
 /// Groups that the lights of a view are read in: enough for some threads, few enough that what a group has
 /// in common (a block of factors, say) is worked out seldom.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use btfkit_formats::{About, Contents, Direction};
 
-use super::adapt::{Adaptation, Side};
 use crate::error::{Error, Result};
+use crate::store::measurement::{Adaptation, Side};
 
 impl Adaptation {
     /// Lights and views as the archive has them, by their numbers, that are left out: light and view may be exchanged.

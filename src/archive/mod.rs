@@ -3,8 +3,7 @@
 //! [`open`] recognises what lies at a path by its content; whatever it is, the rest of the program sees a
 //! [`Source`]. [`adapt`] wraps a source to mend what is known to be wrong with an archive.
 
-pub mod adapt;
-mod as_options;
+mod adapt;
 mod catalogue;
 mod container;
 pub(crate) mod directions;
@@ -23,14 +22,12 @@ use std::path::{Path, PathBuf};
 use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;
 use btfkit_formats::{Contents, Limits, Samples};
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 
 use crate::color::Remarkable;
 use crate::error::{Error, ErrorKind, Result};
 use crate::run::{Context, recipe};
-use adapt::Adaptation;
+use crate::store::measurement::{Adaptation, Reading};
 
 /// Bytes that tell one container from another.
 const HEAD_BYTES: u64 = 4096;
@@ -151,43 +148,7 @@ impl Options {
     }
 }
 
-/// How an archive is read, as recipes hold it.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Reading {
-    /// What is mended.
-    #[serde(flatten)]
-    pub adaptation: Adaptation,
-    /// The published list or order that was named.
-    pub order: Option<String>,
-    /// Whether rows of Bonn containers begin with the bottom one.
-    pub bottom_row_first: bool,
-    /// Whether scan lines of Radiance pictures that are columns are read as rows.
-    pub columns_as_rows: bool,
-}
-
 impl Reading {
-    /// The reading that a recipe holds. A recipe that is older than an option does not name it.
-    ///
-    /// # Errors
-    /// What no reading has: another name, another type, views out of order, a turn that is not by right angles.
-    pub(crate) fn parse(stored: &Value) -> std::result::Result<Self, String> {
-        let reading: Self = serde_json::from_value(stored.clone()).map_err(|error| error.to_string())?;
-        let known = serde_json::to_value(&reading).map_err(|error| error.to_string())?;
-        let unknown = |name: &&String| known.get(name.as_str()).is_none();
-        if let Some(name) = stored.as_object().into_iter().flat_map(|members| members.keys()).find(unknown) {
-            return Err(format!("unknown field `{name}`"));
-        }
-        let Adaptation { drop_views, turn_deg, .. } = &reading.adaptation;
-        if !drop_views.is_sorted_by(|a, b| a < b) {
-            return Err(format!("drop_views: got {drop_views:?}, expected each once, in order"));
-        }
-        if *turn_deg >= 360 || turn_deg % 90 != 0 {
-            return Err(format!("turn_deg: got {turn_deg}, expected 0, 90, 180 or 270"));
-        }
-        Ok(reading)
-    }
-
     /// Every option by its name, so that a new one is not forgotten.
     fn of(options: &Options) -> Self {
         let Options {

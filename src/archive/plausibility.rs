@@ -3,8 +3,8 @@
 use btfkit_formats::picture::wavelength_nm;
 use btfkit_formats::{Contents, Direction};
 
-use super::adapt::Side;
 use crate::error::{Error, Result};
+use crate::store::measurement::Side;
 
 /// Directions nearer to each other than this are hardly meant to be two, degrees.
 const NEAR_DEG: f64 = 0.05;

@@ -19,9 +19,9 @@ use serde_json::json;
 use super::angular::interpolation;
 use super::finding::{Check, Finding, Severity, confidence, round};
 use super::statistics::{DECLARED, READINGS, Statistics, deviation, median};
-use crate::archive::adapt::Side;
 use crate::archive::directions::of_elevation;
 use crate::color::Transfer;
+use crate::store::measurement::Side;
 use btfkit_formats::Direction;
 
 /// Name of the check.

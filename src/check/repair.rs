@@ -2,8 +2,8 @@
 //! is one set of options, and an option that was given is never advised again.
 
 use super::Report;
-use crate::archive::adapt::{Adaptation, Side};
 use crate::color::Transfer;
+use crate::store::measurement::{Adaptation, Side};
 
 impl Report {
     /// Turns what repairs the measurement as it was read into all that `btf import` is to be told.
@@ -86,7 +86,7 @@ fn repaired(given: &Adaptation, repair: &str) -> Option<Adaptation> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::archive::adapt::Type;
+    use crate::store::measurement::Type;
 
     /// What is advised where an archive was read so and this was found.
     fn advised(given: &Adaptation, repair: &str) -> Option<String> {

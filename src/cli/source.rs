@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use btfkit::archive::adapt::{Adaptation, Side, Type};
-use btfkit::archive::{self, Reading, Source};
+use btfkit::archive::{self, Source};
 use btfkit::color::Transfer;
 use btfkit::error::Result;
+use btfkit::store::measurement::{Adaptation, Reading, Side, Type};
 use btfkit::store::recognise::expect_readable;
 use btfkit_formats::bonn::RowOrder;
 use btfkit_formats::picture::HdrOrientation;

@@ -4,7 +4,8 @@
 //! hoods off it, and its sides curl inwards. Texture coordinates are lengths along profile and width, so that the
 //! material has the same size everywhere.
 
-use super::mesh::{Corner, Mesh};
+use super::corner::Corner;
+use super::mesh::Mesh;
 use super::vector::{Vector, along, cross, length, minus, unit};
 use crate::error::Result;
 

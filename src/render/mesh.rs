@@ -6,27 +6,11 @@ use bvh::bvh::{Bvh, BvhNode};
 use nalgebra::{Point3, Vector3};
 
 use super::camera::Ray;
-use super::surface::{Frame, Hit, NEAR};
+use super::corner::Corner;
+use super::hit::{Frame, Hit, NEAR};
 use super::vector::{Vector, along, cross, dot, length, minus, unit};
 use super::{glb, obj};
 use crate::error::{Error, Result};
-use crate::words::counted;
-
-/// Most triangles of an object: numbers and memory stay within bounds.
-pub(super) const MOST_TRIANGLES: usize = 1 << 26;
-
-/// A corner of a triangle, as files have it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Corner {
-    /// Where it is.
-    pub place: Vector,
-    /// Texture coordinates, to the right and up.
-    pub texture: [f64; 2],
-    /// The normal of the smooth surface, if it is known.
-    pub normal: Option<Vector>,
-    /// Direction in which the first texture coordinate grows and 1, or -1 where the texture is mirrored, if known.
-    pub tangent: Option<(Vector, f64)>,
-}
 
 /// A triangle as it is asked for.
 struct Triangle {
@@ -61,20 +45,21 @@ impl BHShape<f64, 3> for Triangle {
 }
 
 impl Mesh {
-    /// Bytes that so many triangles and their tree take.
-    pub fn bytes(triangles: usize) -> u64 {
-        (triangles * (size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>())) as u64
+    /// The most triangles that so many bytes hold, with their tree and while they are read.
+    pub fn most_within(bytes: u64) -> usize {
+        let each = size_of::<[Corner; 3]>() + size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>();
+        usize::try_from(bytes / each as u64).unwrap_or(usize::MAX)
     }
 
-    /// Reads a file, Wavefront OBJ or binary glTF (GLB), by the ending of its name.
+    /// Reads a file, Wavefront OBJ or binary glTF (GLB), by the ending of its name; at most so many triangles.
     ///
     /// # Errors
-    /// Another ending, a file that is damaged, and triangles without texture coordinates.
-    pub fn read(name: &str, bytes: &[u8]) -> Result<Self> {
+    /// Another ending, a file that is damaged, triangles without texture coordinates, and too many of them.
+    pub fn read(name: &str, bytes: &[u8], most: usize) -> Result<Self> {
         let ending = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
         let corners = match ending.as_str() {
-            "obj" => obj::corners(bytes),
-            "glb" => glb::corners(bytes),
+            "obj" => obj::corners(bytes, most),
+            "glb" => glb::corners(bytes, most),
             _ => Err(Error::usage("expected a mesh whose name ends in .obj or .glb")),
         };
         corners.and_then(Self::new).map_err(|error| error.context(name))
@@ -83,12 +68,8 @@ impl Mesh {
     /// Of three corners each. Triangles without an extent are left out.
     ///
     /// # Errors
-    /// No triangle, too many, and numbers that are not finite.
+    /// No triangle, and numbers that are not finite.
     pub fn new(corners: Vec<[Corner; 3]>) -> Result<Self> {
-        if corners.len() > MOST_TRIANGLES {
-            let found = counted(corners.len(), "triangle");
-            return Err(Error::input(format!("got {found}, expected at most {MOST_TRIANGLES}")));
-        }
         let mut corners = corners;
         fit(&mut corners)?;
         let mut triangles: Vec<Triangle> = corners.iter().filter_map(triangle).collect();

@@ -7,8 +7,10 @@
 //! straight from lights; what surfaces reflect onto each other is left to path tracers.
 
 pub mod camera;
+pub mod corner;
 mod environment;
 mod glb;
+pub mod hit;
 pub mod interior;
 pub mod light;
 pub mod mesh;

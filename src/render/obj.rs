@@ -1,13 +1,13 @@
 //! Triangles of a Wavefront OBJ file, by the crate `tobj`.
 
-use super::mesh::{Corner, MOST_TRIANGLES};
+use super::corner::{Corner, expect_at_most};
 use crate::error::{Error, Result};
 
 /// All triangles of a file, groups and materials together; polygons are cut into triangles.
 ///
 /// # Errors
 /// A file that cannot be read, and faces without texture coordinates.
-pub(super) fn corners(bytes: &[u8]) -> Result<Vec<[Corner; 3]>> {
+pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -42,6 +42,7 @@ pub(super) fn corners(bytes: &[u8]) -> Result<Vec<[Corner; 3]>> {
                 tangent: None,
             })
         };
+        expect_at_most(most, triangles.len() + mesh.indices.len() / 3)?;
         for first in (0..mesh.indices.len() / 3 * 3).step_by(3) {
             let triangle = [corner(first), corner(first + 1), corner(first + 2)];
             let [Some(a), Some(b), Some(c)] = triangle else {
@@ -51,9 +52,6 @@ pub(super) fn corners(bytes: &[u8]) -> Result<Vec<[Corner; 3]>> {
                 )));
             };
             triangles.push([a, b, c]);
-        }
-        if triangles.len() > MOST_TRIANGLES {
-            return Err(Error::input(format!("got more than {MOST_TRIANGLES} triangles")));
         }
     }
     Ok(triangles)

@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use btfkit_formats::Direction;
 
 use super::camera::{Camera, Ray, View};
+use super::corner::Corner;
 use super::light::{Light, Place};
-use super::mesh::{Corner, Mesh};
+use super::mesh::Mesh;
 use super::surface::Surface;
 use super::texture::Texture;
 use super::vector::{Vector, along, dot, unit};
@@ -216,9 +217,9 @@ fn the_material_lies_as_the_texture_does_also_turned_and_mirrored() {
         let files = [
             ("corners", Mesh::new(plain.clone())),
             ("corners with tangents", Mesh::new(with_tangents.clone())),
-            ("obj", Mesh::read("a.obj", &obj(&plain))),
-            ("glb", Mesh::read("a.glb", &glb(&plain, 1.0))),
-            ("glb with tangents", Mesh::read("a.GLB", &glb(&with_tangents, 1.0))),
+            ("obj", Mesh::read("a.obj", &obj(&plain), 1000)),
+            ("glb", Mesh::read("a.glb", &glb(&plain, 1.0), 1000)),
+            ("glb with tangents", Mesh::read("a.GLB", &glb(&with_tangents, 1.0), 1000)),
         ];
         for (what, mesh) in files {
             let scene = scene(Surface::Mesh(mesh.unwrap()), vec![Light::far(light)]);
@@ -231,7 +232,7 @@ fn the_material_lies_as_the_texture_does_also_turned_and_mirrored() {
         }
     }
     // An object that its node mirrors is mirrored with its texture, and keeps its front.
-    let mesh = Mesh::read("a.glb", &glb(&square(|x, y| [x, y], None), -1.0)).unwrap();
+    let mesh = Mesh::read("a.glb", &glb(&square(|x, y| [x, y], None), -1.0), 1000).unwrap();
     let scene = scene(Surface::Mesh(mesh), vec![Light::far(light)]);
     let pixel = shown(&scene, &compass(), [0.0, 0.0, 4.0], 1).pixels[24 * 48 + 24];
     assert!((f64::from(pixel[0]) - (0.5 - 0.5 * lx)).abs() < 0.02, "{pixel:?}");
@@ -262,23 +263,23 @@ fn damaged_meshes_are_refused_or_read_and_never_more() {
     let triangles = square(|x, y| [x, y], Some(([1.0, 0.0, 0.0], 1.0)));
     for (name, bytes) in [("a.glb", glb(&triangles, 1.0)), ("a.obj", obj(&triangles))] {
         for end in 0..bytes.len() {
-            let _ = Mesh::read(name, &bytes[..end]);
+            let _ = Mesh::read(name, &bytes[..end], 1000);
         }
         for at in 0..bytes.len() {
             for bit in 0..8 {
                 let mut flipped = bytes.clone();
                 flipped[at] ^= 1 << bit;
-                let _ = Mesh::read(name, &flipped);
+                let _ = Mesh::read(name, &flipped, 1000);
             }
         }
     }
-    let text = |text: &str| Mesh::read("a.obj", text.as_bytes()).err().map(|error| error.to_string());
+    let text = |text: &str| Mesh::read("a.obj", text.as_bytes(), 1000).err().map(|error| error.to_string());
     assert!(
         text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").is_some_and(|told| told.contains("texture coordinates"))
     );
     assert!(text("").is_some_and(|told| told.contains("without triangles")));
     assert!(text("v 0 0 0\nv nan 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n").is_some());
-    assert!(Mesh::read("a.stl", b"solid").is_err());
+    assert!(Mesh::read("a.stl", b"solid", 1000).is_err());
     // A tree as deep as it gets: places that halve again and again.
     let deep = |n: i32| {
         let corner = |x: f64, y: f64| Corner {
@@ -312,7 +313,7 @@ fn the_interior_has_a_front_and_its_texture_one_size() {
         let texture = (next.place[0] - hit.place[0]).hypot(next.place[1] - hit.place[1]);
         let ratio = texture / dot(way, way).sqrt();
         // Stretched where a bolster or a hood is lifted, never torn.
-        assert!((0.3..2.5).contains(&ratio), "{ratio} at {:?}", hit.point);
+        assert!((0.3..3.0).contains(&ratio), "{ratio} at {:?}", hit.point);
     }
     assert!(seen > 250, "{seen}");
 }

@@ -4,8 +4,9 @@ use rayon::prelude::*;
 
 use super::camera::{Camera, Ray};
 use super::environment::Environment;
+use super::hit::Hit;
 use super::light::Light;
-use super::surface::{Hit, Surface};
+use super::surface::Surface;
 use super::texture::{Reader, Texture};
 use super::vector::{along, dot, turned};
 use crate::error::{Error, Result};

@@ -109,7 +109,8 @@ mod tests {
             let mut changed = bytes.clone();
             changed[at] ^= 1;
             std::fs::write(partial.path(3), &changed).unwrap();
-            assert_ne!(partial.read::<Vec<f64>>(3), Some(values.clone()), "byte {at}");
+            // Some last digits say the same number.
+            assert!(partial.read::<Vec<f64>>(3).is_none_or(|found| found == values), "byte {at}");
             std::fs::write(partial.path(3), &bytes[..at]).unwrap();
             assert_eq!(partial.read::<Vec<f64>>(3), None, "cut after {at}");
         }

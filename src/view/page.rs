@@ -42,12 +42,12 @@ fn put_together(name: &str, policy: &str, address: &str, material: &str) -> Resu
     let script = bundle();
     for (place, text) in [
         ("{{policy}}", policy),
-        ("{{title}}", &escaped(name)),
         ("{{style}}", STYLE),
         ("{{address}}", address),
         ("{{script}}", &script),
-        // Last, since nothing looks into it any more.
         ("{{material}}", material),
+        // Last, since a name may hold anything.
+        ("{{title}}", &escaped(name)),
     ] {
         let (before, after) = page
             .split_once(place)
@@ -79,7 +79,9 @@ mod tests {
         let page = whole("<b> & co", b"material").unwrap();
         assert!(page.contains("<title>&lt;b&gt; &amp; co"));
         assert!(page.contains(&STANDARD.encode(b"material")));
-        assert!(!page.contains("{{") && !page.contains("\nimport ") && !page.contains("\nexport "));
+        let places = ["policy", "title", "style", "address", "script", "material"];
+        assert!(places.iter().all(|place| !page.contains(&format!("{{{{{place}}}}}"))));
+        assert!(!page.contains("\nimport ") && !page.contains("\nexport "));
         assert!(!page.contains("http://") && !page.contains("https://"), "the page asks for something");
         assert!(served("x").unwrap().contains("data-address=\"material\""));
     }

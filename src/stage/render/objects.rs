@@ -49,12 +49,8 @@ pub(super) fn object(
             let file = bytes_of(path)?;
             let bytes = file.as_ref();
             let name = path.display().to_string();
-            // A triangle has at least a line, or three numbers, in a file.
-            context.require(
-                &format!("the mesh {name}"),
-                Mesh::bytes(bytes.len() / 12).min(64 * bytes.len() as u64),
-            )?;
-            Surface::Mesh(context.compute(|| Mesh::read(&name, bytes))?.with_texture_in_lengths())
+            let most = Mesh::most_within(context.memory_bytes);
+            Surface::Mesh(context.compute(|| Mesh::read(&name, bytes, most))?.with_texture_in_lengths())
         }
     };
     let middle = bounds.map(|(size, _)| [size.width as f64 / 2.0, size.height as f64 / 2.0]);

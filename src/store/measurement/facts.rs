@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::Description;
-use crate::archive::Reading;
-use crate::archive::adapt::Adaptation;
+use super::reading::{Adaptation, Reading};
 use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::recipe::{self, Recipe};

@@ -13,6 +13,8 @@ mod description;
 mod facts;
 pub(crate) mod gather;
 mod read;
+mod reading;
+mod reading_options;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -35,6 +37,7 @@ pub use description::Description;
 use description::SHARD_LIMIT_BYTES;
 pub use facts::ImportRecipe;
 use facts::{Facts, RADIOMETRY};
+pub use reading::{Adaptation, Reading, Side, Type};
 pub(crate) use write::encoded_bytes;
 
 /// The attribute `kind` of a measurement store.

@@ -1,8 +1,7 @@
 //! A reading of an archive as the options of the command line that ask for it: what users are told of a store, and
 //! what repairs one.
 
-use super::Reading;
-use super::adapt::{Adaptation, Side, Type};
+use super::reading::{Adaptation, Reading, Side, Type};
 use crate::color::Transfer;
 
 impl Adaptation {

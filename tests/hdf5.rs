@@ -14,10 +14,10 @@ use std::time::{Duration, Instant};
 use ::hdf5::filters::ScaleOffset;
 use ::hdf5::types::{FixedAscii, VarLenUnicode};
 use ::hdf5::{Dataset, File, Group, H5Type};
-use btfkit::archive::hdf5::{Archive, Writer, recognise};
+use btfkit::archive::hdf5::{Archive, Writer};
 use btfkit::shape::{Size, Window};
 use btfkit::{ErrorKind, Result};
-use btfkit_formats::{Contents, Direction, Limits, SampleType, Samples, f16};
+use btfkit_formats::{ContainerKind, Contents, Direction, Limits, SampleType, Samples, f16};
 use ndarray::{Array2, Array4, ArrayD};
 use serde_json::{Map, json};
 
@@ -111,7 +111,7 @@ fn what_is_written_is_read_back_for_every_type() {
         let path = folder.path().join(sample_type.name());
         let contents = contents(SIZE, 3, 5, channels, sample_type);
         write(&path, &contents, sample_type == SampleType::U8);
-        assert!(recognise(&std::fs::read(&path).unwrap()));
+        assert_eq!(ContainerKind::recognise(&std::fs::read(&path).unwrap()), Some(ContainerKind::Hdf5));
         let archive = open(&path).unwrap();
         let found = archive.contents();
         assert_eq!((found.width, found.height, &found.channels), (33, 19, &contents.channels));

@@ -28,7 +28,8 @@ pub enum ContainerKind {
 impl ContainerKind {
     /// The container that begins with these bytes; `None` if it is none.
     pub fn recognise(head: &[u8]) -> Option<Self> {
-        const KINDS: [(ContainerKind, fn(&[u8]) -> bool); 6] = [
+        type Fits = fn(&[u8]) -> bool;
+        const KINDS: [(ContainerKind, Fits); 6] = [
             (ContainerKind::Bonn, |head| bonn::recognise(head).is_some()),
             (ContainerKind::Mlvq, mlvq::recognise),
             (ContainerKind::Big, big::recognise),

@@ -233,6 +233,7 @@ mod tests {
     use btfkit_formats::Direction;
 
     use super::*;
+    use crate::store::measurement::{Side, Type};
 
     fn adapted(
         inner: Box<dyn Source>,

@@ -3,7 +3,7 @@
 //! [`open`] recognises what lies at a path by its content; whatever it is, the rest of the program sees a
 //! [`Source`]. [`adapt`] wraps a source to mend what is known to be wrong with an archive.
 
-mod adapt;
+pub(crate) mod adapt;
 mod catalogue;
 mod container;
 pub(crate) mod directions;

@@ -214,9 +214,62 @@ fn integers_of_fewer_bits_than_their_type_are_told() {
     let places: Vec<usize> = (0..bytes.len() - 12).filter(|&at| bytes[at..at + 12] == message).collect();
     assert!(!places.is_empty());
     places.into_iter().for_each(|at| bytes[at + 10] = 12);
+    sum_headers_again(&mut bytes);
     std::fs::write(&path, bytes).unwrap();
     let found = open(&path).unwrap();
     assert!(found.contents().assumptions[0].contains("precision of reflectance"));
+}
+
+/// Writes the checksums of all object headers of version 2 anew: signature, version, flags, times and limits where the
+/// flags say so, the length of the messages, the messages, the checksum.
+fn sum_headers_again(bytes: &mut [u8]) {
+    let starts: Vec<usize> =
+        (0..bytes.len() - 16).filter(|&at| bytes[at..].starts_with(b"OHDR\x02")).collect();
+    for start in starts {
+        let flags = bytes[start + 5];
+        let skipped = if flags & 0x20 != 0 { 16 } else { 0 } + if flags & 0x10 != 0 { 4 } else { 0 };
+        let (at, width) = (start + 6 + skipped, 1 << (flags & 3));
+        let length =
+            bytes[at..at + width].iter().rev().fold(0, |length, &byte| length << 8 | usize::from(byte));
+        let end = at + width + length;
+        let sum = lookup3(&bytes[start..end]);
+        bytes[end..end + 4].copy_from_slice(&sum.to_le_bytes());
+    }
+}
+
+/// Bob Jenkins' hash that HDF5 sums its metadata with (`hashlittle` of lookup3.c, from 0).
+fn lookup3(bytes: &[u8]) -> u32 {
+    let mut state = [0xdead_beef_u32.wrapping_add(bytes.len() as u32); 3];
+    let blocks = bytes.len().div_ceil(12);
+    for (number, block) in bytes.chunks(12).enumerate() {
+        let mut padded = [0; 12];
+        padded[..block.len()].copy_from_slice(block);
+        for (word, four) in state.iter_mut().zip(padded.chunks_exact(4)) {
+            *word = word.wrapping_add(u32::from_le_bytes([four[0], four[1], four[2], four[3]]));
+        }
+        let [mut a, mut b, mut c] = state;
+        if number + 1 < blocks {
+            for turns in [[4, 6, 8], [16, 19, 4]] {
+                a = a.wrapping_sub(c) ^ c.rotate_left(turns[0]);
+                c = c.wrapping_add(b);
+                b = b.wrapping_sub(a) ^ a.rotate_left(turns[1]);
+                a = a.wrapping_add(c);
+                c = c.wrapping_sub(b) ^ b.rotate_left(turns[2]);
+                b = b.wrapping_add(a);
+            }
+        } else {
+            for (turns, last) in [([14, 11, 25], false), ([16, 4, 14], false), ([24, 0, 0], true)] {
+                c = (c ^ b).wrapping_sub(b.rotate_left(turns[0]));
+                if last {
+                    break;
+                }
+                a = (a ^ c).wrapping_sub(c.rotate_left(turns[1]));
+                b = (b ^ a).wrapping_sub(a.rotate_left(turns[2]));
+            }
+        }
+        state = [a, b, c];
+    }
+    state[2]
 }
 
 /// A list of images in an order of its own, as h5py leaves it without being asked for anything.

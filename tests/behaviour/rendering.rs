@@ -131,7 +131,7 @@ fn a_mesh_and_an_environment_are_read_and_what_they_lack_is_told() {
 fn an_enlargement_that_is_too_small_for_an_object_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let told = succeed(&mut render(&fixture().enlarged(), &at("fits.png")));
+    let told = succeed(render(&fixture().enlarged(), &at("fits.png")).args(["--scale", "3"]));
     assert!(!told.contains("note"), "{told}");
     let told = succeed(render(&fixture().enlarged(), &at("beyond.png")).args(["--scale", "0.2"]));
     assert!(told.contains("530x700 texels and does not repeat"), "{told}");

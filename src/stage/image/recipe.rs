@@ -126,12 +126,12 @@ impl SceneRecipe {
         {
             return Err(format!("source: got a side of {side}, expected 1 to {MOST_SIDE}"));
         }
-        if let (Some([x, y, ..]), Some([rows, columns])) = (window, stored) {
+        if let (Some(part @ [x, y, ..]), Some([rows, columns])) = (window, stored) {
             let fits = |start: i64, length: usize, all: usize| {
                 usize::try_from(start).is_ok_and(|start| start <= all && length <= all - start)
             };
             if !fits(x, width, columns) || !fits(y, height, rows) {
-                return Err(format!("source: window: got {window:?} of {columns}x{rows}"));
+                return Err(format!("source: window: got {part:?} of {columns}x{rows}"));
             }
         }
         Ok([height, width])

@@ -112,7 +112,10 @@ impl EnlargeRecipe {
         ];
         for (name, belongs, found, expected) in members {
             match found {
-                Some(_) if !belongs => return Err(format!("{name}: method {rule:?} has none")),
+                Some(_) if !belongs => {
+                    let rule = format!("{rule:?}").to_lowercase();
+                    return Err(format!("{name}: got one, which --method {rule} has not"));
+                }
                 Some(false) => return Err(format!("{name}: expected {expected}")),
                 None if belongs && is_new => return Err(format!("{name}: got none, expected {expected}")),
                 _ => {}

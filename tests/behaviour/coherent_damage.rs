@@ -225,7 +225,7 @@ fn a_damaged_enlarged_index_is_refused() {
         // The oldest recipes name no method; theirs was the paper's.
         ("recipe/rule", None, "--method paper"),
         ("recipe/source", Some(json!("yes")), "recipe"),
-        ("recipe/source", None, "texel"),
+        ("recipe/source", None, "source: got none"),
         ("recipe/model", Some(json!("0123")), "another model"),
         ("recipe", Some(json!([])), "recipe"),
         ("kind", Some(json!("model")), ""),

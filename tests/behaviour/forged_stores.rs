@@ -177,7 +177,12 @@ fn numbers_that_contradict_the_arrays_or_lie_beyond_their_range_are_told() {
         ("m.zarr", "/stages/appearance/report/found", json!("there"), "found: got \"there\""),
         ("m.zarr", "/stages/appearance/report/strongest_peak", json!(2.0), "strongest_peak: got 2"),
         ("coherent.zarr", "/recipe/jitter", json!(257), "jitter: expected 0 to 256"),
-        ("coherent.zarr", "/recipe/candidates", json!(8), "candidates: got one, which --method coherent has not"),
+        (
+            "coherent.zarr",
+            "/recipe/candidates",
+            json!(8),
+            "candidates: got one, which --method coherent has not",
+        ),
         ("quilt.zarr", "/recipe/jitter", json!(8), "jitter: got one, which --method quilt has not"),
         ("paper.zarr", "/recipe/candidates", json!(481), "candidates: expected 1 to 480"),
         ("paper.zarr", "/recipe/source", json!(true), "source: got one, which --method paper has not"),
@@ -190,7 +195,7 @@ fn numbers_that_contradict_the_arrays_or_lie_beyond_their_range_are_told() {
         ("p_files", "/recipe/view", json!([91.0, 0.0]), "view: got 91,0 degrees"),
         ("p_files", "/recipe/source/size", json!([0, 40]), "a side of 0"),
         ("p_files", "/recipe/source/window", json!([1, 0, 40, 32]), "window: got [1, 0, 40, 32] of 40x32"),
-        ("p_files", "/recipe/source/kind", json!("plane"), "missing field"),
+        ("p_files", "/recipe/source/kind", json!("plane"), "unknown field `size`"),
         ("p_files", "/recipe/method", json!(2), "method: got 2, expected 1 to 1"),
         ("p_files", "/kind", json!("model"), "unknown variant `model`"),
     ];

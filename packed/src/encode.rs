@@ -28,7 +28,8 @@ pub struct Packed {
     pub step: f32,
     /// Its components.
     pub components: usize,
-    /// Peak signal-to-noise ratio to what the model was made of, dB, if it is known what the model leaves out.
+    /// Peak signal-to-noise ratio, dB: to what the model was made of if it is known what the model leaves out, else to
+    /// the model.
     pub decibels: f64,
 }
 
@@ -47,16 +48,16 @@ pub(crate) struct Prepared<'a> {
     transforms: Transforms,
     mean: Vec<f64>,
     parts: Vec<Part>,
-    /// Squared error of the whole model.
-    residual: f64,
+    /// Squared error of the whole model, if it is known.
+    residual: Option<f64>,
 }
 
 impl<'a> Prepared<'a> {
-    /// Transforms a model, whose squared error over all texels and directions is `residual`.
+    /// Transforms a model, whose squared error over all texels and directions is `residual`, if it is known.
     ///
     /// # Errors
     /// A model whose parts do not fit together.
-    pub(crate) fn new(model: &'a Model, residual: f64) -> Result<Self> {
+    pub(crate) fn new(model: &'a Model, residual: Option<f64>) -> Result<Self> {
         model.check()?;
         // What a file says of sizes and directions.
         let header = Header::of(model, 1.0, 1, 1)?.to_bytes()?;
@@ -115,7 +116,7 @@ impl<'a> Prepared<'a> {
             let coarse = finest * f64::from(1u32 << low);
             let mut encoder = Encoder::new();
             stream.code_mean(&mut encoder, low, &mean);
-            let mut error = self.residual + distance(&self.mean, &mean, low, finest);
+            let mut error = self.residual.unwrap_or(0.0) + distance(&self.mean, &mean, low, finest);
             let before = components;
             let mut refused = false;
             for (number, (part, numbers)) in self.parts.iter().zip(&parts).enumerate() {
@@ -140,7 +141,9 @@ impl<'a> Prepared<'a> {
             }
             decibels = self.decibels(error);
             let strengths = self.parts[before..components].iter().map(|part| part.strength).collect();
-            let centibels = (decibels * 100.0).round().clamp(1.0, f64::from(u16::MAX)) as u16;
+            // 0 stands for what is not known.
+            let known = (decibels * 100.0).round().clamp(1.0, f64::from(u16::MAX)) as u16;
+            let centibels = if self.residual.is_some() { known } else { 0 };
             let payload = encoder.finish();
             Section { components, centibels, strengths, payload: &payload }.write(&mut bytes);
         }

@@ -30,12 +30,12 @@ const NEAR: f64 = 0.004;
 /// Bytes below which a file has few sections: each costs a dozen.
 const SMALL: usize = 1 << 14;
 
-/// Packs a model. `residual` is the squared error of the model itself, over all texels and directions; it is only
-/// needed to say how good the result is.
+/// Packs a model. `residual` is the squared error of the model itself, over all texels and directions, if it is known;
+/// it is only needed to say how good the result is.
 ///
 /// # Errors
 /// A target that cannot be met; a model whose parts do not fit together, or that the format has no room for.
-pub fn pack(model: &Model, residual: f64, target: Target) -> Result<Packed> {
+pub fn pack(model: &Model, residual: Option<f64>, target: Target) -> Result<Packed> {
     let prepared = Prepared::new(model, residual)?;
     let largest = libm::log2(prepared.largest());
     if !largest.is_finite() {

@@ -50,7 +50,7 @@ fn a_model_comes_back_as_good_as_is_said_with_what_is_said_of_it() {
     {
         let model = model(size, counts, components);
         for target in [Target::Bytes(1500), Target::Decibels(45.0)] {
-            let packed = pack(&model, 0.0, target).unwrap();
+            let packed = pack(&model, Some(0.0), target).unwrap();
             let found = unpack(&packed.bytes).unwrap();
             assert_eq!(found.ending, Ending::Whole);
             let back = &found.model;
@@ -68,7 +68,7 @@ fn a_model_comes_back_as_good_as_is_said_with_what_is_said_of_it() {
                 Target::Bytes(bytes) => assert!(packed.bytes.len() <= bytes),
                 Target::Decibels(wanted) => assert!(packed.decibels >= wanted && decibels > wanted - 0.6),
             }
-            assert_eq!(pack(&model, 0.0, target).unwrap().bytes, packed.bytes);
+            assert_eq!(pack(&model, Some(0.0), target).unwrap().bytes, packed.bytes);
         }
     }
 }
@@ -76,7 +76,7 @@ fn a_model_comes_back_as_good_as_is_said_with_what_is_said_of_it() {
 #[test]
 fn every_cut_gives_the_sections_before_it_or_an_error() {
     let model = model([16, 16], [6, 6, 3], 4);
-    let packed = pack(&model, 0.0, Target::Bytes(1400)).unwrap();
+    let packed = pack(&model, Some(0.0), Target::Bytes(1400)).unwrap();
     let whole = unpack(&packed.bytes).unwrap();
     assert!(whole.planes.len() >= 4);
     let mut before = f64::INFINITY;
@@ -103,7 +103,7 @@ fn every_cut_gives_the_sections_before_it_or_an_error() {
 
 #[test]
 fn every_flipped_bit_is_an_error_or_a_shorter_prefix() {
-    let packed = pack(&model([8, 8], [5, 5, 3], 3), 0.0, Target::Bytes(700)).unwrap();
+    let packed = pack(&model([8, 8], [5, 5, 3], 3), Some(0.0), Target::Bytes(700)).unwrap();
     let whole = unpack(&packed.bytes).unwrap();
     for bit in 0..8 * packed.bytes.len() {
         let mut bytes = packed.bytes.clone();
@@ -142,7 +142,7 @@ fn with_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
 
 #[test]
 fn files_with_right_checksums_and_wrong_contents_are_read_or_refused_in_little_time() {
-    let packed = pack(&model([8, 8], [5, 5, 3], 3), 0.0, Target::Bytes(700)).unwrap();
+    let packed = pack(&model([8, 8], [5, 5, 3], 3), Some(0.0), Target::Bytes(700)).unwrap();
     assert_eq!(with_checksums(packed.bytes.clone()), packed.bytes);
     let mut state = 3u32;
     let mut next = || {
@@ -167,14 +167,14 @@ fn files_with_right_checksums_and_wrong_contents_are_read_or_refused_in_little_t
 #[test]
 fn what_cannot_be_reached_is_said() {
     let given = model([8, 8], [5, 5, 3], 2);
-    let error = |target| pack(&given, 1e6, target).unwrap_err().to_string();
+    let error = |target| pack(&given, Some(1e6), target).unwrap_err().to_string();
     assert!(error(Target::Bytes(10)).contains("expected at least"), "{}", error(Target::Bytes(10)));
     assert!(error(Target::Decibels(90.0)).contains("expected at most"), "{}", error(Target::Decibels(90.0)));
     let mut broken = given.clone();
     broken.mean[3] = f64::NAN;
-    assert!(pack(&broken, 0.0, Target::Bytes(999)).unwrap_err().to_string().contains("NaN"));
+    assert!(pack(&broken, Some(0.0), Target::Bytes(999)).unwrap_err().to_string().contains("NaN"));
     // A file that has everything is not made longer.
-    let all = pack(&given, 0.0, Target::Bytes(1 << 30)).unwrap();
+    let all = pack(&given, Some(0.0), Target::Bytes(1 << 30)).unwrap();
     assert!(all.decibels > 60.0 && all.bytes.len() < 40_000, "{} {}", all.decibels, all.bytes.len());
 }
 
@@ -220,7 +220,7 @@ fn numbers(model: &Model) -> Vec<f64> {
 fn the_fixture_is_what_is_written_and_reads_as_it_did() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
     let (file, values) = (folder.join("small.btfc"), folder.join("small.f64"));
-    let packed = pack(&fixture(), 0.0, Target::Decibels(32.0)).unwrap();
+    let packed = pack(&fixture(), Some(0.0), Target::Decibels(32.0)).unwrap();
     if std::env::var_os("BTFKIT_WRITE_FIXTURES").is_some() {
         let found = numbers(&unpack(&packed.bytes).unwrap().model);
         std::fs::write(&values, found.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()).unwrap();

@@ -225,12 +225,10 @@ fn of_packed(about: &pack::About) -> Rows {
         rows.push(row!["the tile's samples", format!("{}, 1:{ratio:.0}", bytes_text(raw))]);
     }
     for (number, plane) in about.planes.iter().enumerate() {
-        let to = format!(
-            "to byte {}, {}, PSNR {:.2} dB",
-            plane.bytes,
-            counted(plane.components, "component"),
-            plane.psnr_db
-        );
+        let quality =
+            if plane.psnr_db > 0.0 { format!("{:.2} dB", plane.psnr_db) } else { "not known".to_owned() };
+        let to =
+            format!("to byte {}, {}, PSNR {quality}", plane.bytes, counted(plane.components, "component"));
         rows.push(row![format!("plane {}", number + 1), to]);
     }
     rows.extend(about.texts.iter().map(|(name, text)| row![name, text]));

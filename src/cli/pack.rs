@@ -82,12 +82,12 @@ impl Pack {
             return console.plan(&as_json(&report)?);
         }
         console.line(format!(
-            "{}: {}, 1:{:.0} of the tile's samples, {}, PSNR {:.2} dB{}",
+            "{}: {}, 1:{:.0} of the tile's samples, {}, PSNR {}{}",
             self.output.display(),
             bytes_text(report.bytes),
             report.tile_bytes as f64 / report.bytes as f64,
             counted(report.components, "component"),
-            report.psnr_db,
+            report.psnr_db.map_or("not known".to_owned(), |psnr| format!("{psnr:.2} dB")),
             report.made.map_or("", found)
         ));
         if report.components == report.components_of_model {

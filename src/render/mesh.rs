@@ -119,7 +119,10 @@ impl Mesh {
         let query = bvh::ray::Ray {
             origin: Point3::from(ray.origin),
             direction: Vector3::from(ray.direction),
-            inv_direction: Vector3::from(ray.direction.map(|value| 1.0 / value)),
+            // Of 0 the crate would make what is no number where a ray lies within the side of a box.
+            inv_direction: Vector3::from(
+                ray.direction.map(|value| 1.0 / if value == 0.0 { f64::MIN_POSITIVE } else { value }),
+            ),
         };
         // A stack of its own, since that of the crate's iterator ends at a depth of 32.
         let mut stack = Vec::with_capacity(64);
@@ -165,7 +168,9 @@ impl Mesh {
         let out = unit(mixed(triangle.normals)).unwrap_or(normal);
         // Normals of corners say which side is out; those of the triangle follow.
         let normal = if dot(normal, out) < 0.0 { normal.map(|value| -value) } else { normal };
-        let frame = Frame::new(out, mixed(triangle.tangents), triangle.mirrored)?;
+        // A tangent along the normal says nothing: any other direction will do.
+        let rights = [mixed(triangle.tangents), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let frame = rights.into_iter().find_map(|right| Frame::new(out, right, triangle.mirrored))?;
         let [a, b, c] = triangle.textures;
         let place = std::array::from_fn(|axis| first * a[axis] + second * b[axis] + third * c[axis]);
         Some(Hit { distance, point: along(ray.origin, distance, ray.direction), normal, frame, place })

@@ -317,3 +317,28 @@ fn the_interior_has_a_front_and_its_texture_one_size() {
     }
     assert!(seen > 250, "{seen}");
 }
+
+#[test]
+fn a_ray_within_the_side_of_a_box_and_a_tangent_along_the_normal_leave_no_hole() {
+    // Two strips that meet at x = 0: the boxes of both end there, and the ray runs along that side.
+    let strip = |x: f64, tangent: Option<(Vector, f64)>| {
+        let corner = |x: f64, y: f64| Corner {
+            place: [x, y, 0.0],
+            texture: [x, y],
+            normal: Some([0.0, 0.0, 1.0]),
+            tangent,
+        };
+        [
+            [corner(0.0, -1.0), corner(x, -1.0), corner(x, 1.0)],
+            [corner(0.0, -1.0), corner(x, 1.0), corner(0.0, 1.0)],
+        ]
+    };
+    for tangent in [None, Some(([0.0, 0.0, 1.0], 1.0))] {
+        let triangles = [strip(-1.0, tangent), strip(1.0, tangent)].concat();
+        let mesh = Surface::Mesh(Mesh::new(triangles).unwrap());
+        for y in [-0.4, 0.0, 0.3] {
+            let ray = Ray { origin: [0.0, y, 4.0], direction: [0.0, 0.0, -1.0] };
+            assert!(mesh.hit(&ray).is_some(), "{tangent:?}, y {y}");
+        }
+    }
+}

@@ -66,7 +66,7 @@ pub struct Packed {
     /// Components of the model.
     pub components_of_model: usize,
     /// Peak signal-to-noise ratio to the samples, dB.
-    pub psnr_db: f64,
+    pub psnr_db: Option<f64>,
     /// Whether it was there already.
     #[serde(skip)]
     pub made: Option<Made>,
@@ -109,6 +109,13 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
     context.require("packing components", 5 * model.components_bytes()?)?;
     let whole = unpacked_model(&model, options)?;
+    if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
+        return Err(Error::usage(format!(
+            "{}: its components come from a packed file, so it is not known how far they are from the measurement",
+            options.model.display()
+        ))
+        .hint("ask for bytes or a ratio, or find the components of the measurement: btf components"));
+    }
     let target = match options.quality {
         Quality::Bytes(bytes) => packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
         Quality::Ratio(ratio) => packed::Target::Bytes((report.tile_bytes as f64 / ratio) as usize),
@@ -116,7 +123,7 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     };
     context.check_stop()?;
     let file = context
-        .compute(|| packed::pack(&whole, report.squared_error.unwrap_or(0.0), target))
+        .compute(|| packed::pack(&whole, report.squared_error, target))
         .map_err(|error| Error::usage(format!("{}: {error}", options.model.display())))?;
     let made = output::prepare_bytes(&options.output, context.existing, &file.bytes)?.publish()?;
     Ok(Packed {
@@ -124,7 +131,7 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         tile_bytes: report.tile_bytes,
         components: file.components,
         components_of_model: report.components,
-        psnr_db: file.decibels,
+        psnr_db: report.squared_error.map(|_| file.decibels),
         made: Some(made),
     })
 }

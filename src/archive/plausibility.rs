@@ -111,18 +111,28 @@ pub(super) fn doubtful_angles(contents: &Contents, elevations: Option<Side>) -> 
         ));
     }
     let [lights_read, views_read] = Side::lights_and_views(elevations);
-    for (what, highest, is_read) in [("view", views, views_read), ("light", lights, lights_read)] {
-        if highest > 89.5 {
-            let found = format!(
-                "a {what} is {highest:.1} degrees from the normal, where nothing can be seen: if the angles are"
-            );
-            notes.push(match is_read {
-                true => format!("{found} no elevations, leave out --polar"),
-                false => {
-                    format!("{found} elevations above the surface, --polar elevation-{what}s reads them so")
-                }
-            });
-        }
+    let sides = [("views", views, views_read), ("lights", lights, lights_read)];
+    let is_grazing = |highest: f64| highest > 89.5;
+    let found = |(what, highest, _): &(&str, f64, bool)| {
+        format!(
+            "{what} are up to {highest:.1} degrees from the normal, where nothing can be seen: if the angles are"
+        )
+    };
+    for side in sides.iter().filter(|(_, highest, is_read)| is_grazing(*highest) && *is_read) {
+        notes.push(format!("{} no elevations, leave out --polar", found(side)));
+    }
+    let unread: Vec<_> =
+        sides.iter().filter(|(_, highest, is_read)| is_grazing(*highest) && !is_read).collect();
+    // One option for all of them, and for what is read so already.
+    let option = match Side::of(lights_read || is_grazing(lights), views_read || is_grazing(views)) {
+        Some(Side::Lights) => "elevation-lights",
+        Some(Side::Views) => "elevation-views",
+        _ => "elevation",
+    };
+    if let Some(side) = unread.first() {
+        let found =
+            if unread.len() > 1 { found(side).replacen("views", "views and lights", 1) } else { found(side) };
+        notes.push(format!("{found} elevations above the surface, --polar {option} reads them so"));
     }
     notes
 }

@@ -39,6 +39,12 @@ impl Environment {
             return Err(Error::input("a picture of display values, expected linear ones")
                 .hint("an environment is an OpenEXR (.exr) or a Radiance picture (.hdr)"));
         }
+        let is_finite = |at: &usize| picture.samples.value(*at).is_some_and(f64::is_finite);
+        if let Some(at) = (0..picture.samples.len()).find(|at| !is_finite(at)) {
+            let pixel = at / picture.channels.len().max(1);
+            let (row, column) = (pixel / picture.width as usize, pixel % picture.width as usize);
+            return Err(Error::input(format!("row {row}, column {column}: got a value that is not finite")));
+        }
         let decoder = Decoder::new(Transfer::Linear, picture.samples.sample_type(), &picture.channels)?;
         let step = decoder.channels().max(1);
         let color = |at: usize| decoder.rgb(&picture.samples, at).map(|value| value as f32);

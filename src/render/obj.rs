@@ -8,6 +8,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// A file that cannot be read, and faces without texture coordinates.
 pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
+    expect_texture_coordinates(bytes)?;
     let options = tobj::LoadOptions {
         triangulate: true,
         ignore_points: true,
@@ -22,10 +23,6 @@ pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
         let mesh = model.mesh;
         if mesh.indices.is_empty() {
             continue;
-        }
-        if mesh.texcoord_indices.len() != mesh.indices.len() {
-            return Err(Error::input(format!("object {:?} has no texture coordinates (vt)", model.name))
-                .hint("unwrap it in a modelling program, and export it with texture coordinates"));
         }
         let three = |list: &[f32], at: usize| -> Option<[f64; 3]> {
             let values = list.get(3 * at..3 * at + 3)?;
@@ -55,4 +52,25 @@ pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
         }
     }
     Ok(triangles)
+}
+
+/// Refuses faces with a corner that names no texture coordinates: the crate gives it those of another corner.
+fn expect_texture_coordinates(bytes: &[u8]) -> Result<()> {
+    for (number, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        if words.next() != Some(b"f") {
+            continue;
+        }
+        let names =
+            |corner: &[u8]| corner.split(|&byte| byte == b'/').nth(1).is_some_and(|name| !name.is_empty());
+        // What follows a # is a comment.
+        if !words.take_while(|word| !word.starts_with(b"#")).all(names) {
+            return Err(Error::input(format!(
+                "line {}: a face whose corners have no texture coordinates (vt)",
+                number + 1
+            ))
+            .hint("unwrap it in a modelling program, and export it with texture coordinates"));
+        }
+    }
+    Ok(())
 }

@@ -277,6 +277,8 @@ fn damaged_meshes_are_refused_or_read_and_never_more() {
     assert!(
         text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").is_some_and(|told| told.contains("texture coordinates"))
     );
+    let mixed = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\nf 1/1 2 3/1\n";
+    assert!(text(mixed).is_some_and(|told| told.contains("line 6: a face")), "{:?}", text(mixed));
     assert!(text("").is_some_and(|told| told.contains("without triangles")));
     assert!(text("v 0 0 0\nv nan 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n").is_some());
     assert!(Mesh::read("a.stl", b"solid", 1000).is_err());

@@ -356,6 +356,9 @@ pub struct Restored {
     pub notes: Vec<String>,
 }
 
+/// How near directions are that are one, in each coordinate: files hold them as degrees of finite precision.
+const NEAR: f64 = 1e-3;
+
 /// Makes a model of a packed one, with a tile and components.
 ///
 /// # Errors
@@ -406,6 +409,26 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         model.write_directions(&description)?;
         model.write_tile(&Tile::whole(size, from.wraps))?;
         model.finish(Stage::Tile, &tile_recipe, &report, context)?;
+    }
+    // A tile that was there is taken by its recipe, which a file only claims.
+    let [views, lights] = model.directions()?;
+    let is_same = |there: &[Direction], given: &[Direction]| {
+        let near = |(a, b): (&Direction, &Direction)| {
+            a.vector().iter().zip(b.vector()).all(|(a, b)| (a - b).abs() < NEAR)
+        };
+        there.len() == given.len() && there.iter().zip(given).all(near)
+    };
+    if model.tile()?.size != size
+        || model.tile_report()?.channels.as_ref() != Some(&from.channels)
+        || !is_same(&views, &description.views)
+        || !is_same(&lights, &description.lights)
+    {
+        return Err(Error::recipe(format!(
+            "{}: its tile is not that of {}: another size, other channels or directions",
+            path.display(),
+            file.display()
+        ))
+        .hint("unpack it under another name"));
     }
     let recipe = ComponentsRecipe {
         tile: model.stage_digest(Stage::Tile)?,

@@ -5,6 +5,7 @@
 
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tiny_http::{Header, Method, Request, Response};
@@ -18,6 +19,11 @@ const LOOK: Duration = Duration::from_millis(100);
 /// A server that listens.
 pub struct Server {
     server: tiny_http::Server,
+    site: Arc<Site>,
+}
+
+/// What is served, and to whom.
+struct Site {
     port: u16,
     token: String,
     page: String,
@@ -31,12 +37,12 @@ impl Server {
                 .hint("leave out --port to take any that is free")
         })?;
         let port = server.server_addr().to_ip().map_or(port, |address| address.port());
-        Ok(Self { server, port, token: token(), page, packed })
+        Ok(Self { server, site: Arc::new(Site { port, token: token(), page, packed }) })
     }
 
     /// The address for a browser.
     pub fn address(&self) -> String {
-        format!("http://127.0.0.1:{}/{}/", self.port, self.token)
+        format!("http://127.0.0.1:{}/{}/", self.site.port, self.site.token)
     }
 
     /// Answers until a stop is asked for.
@@ -50,12 +56,16 @@ impl Server {
                 .recv_timeout(LOOK)
                 .map_err(|error| Error::new(ErrorKind::Io, format!("cannot listen any more: {error}")))?;
             if let Some(request) = request {
-                self.answer(request);
+                // One that sends or reads nothing more keeps nobody else waiting.
+                let site = Arc::clone(&self.site);
+                std::thread::spawn(move || site.answer(request));
             }
         }
         Ok(())
     }
+}
 
+impl Site {
     /// Answers one request; a browser that goes away meanwhile is no matter.
     fn answer(&self, request: Request) {
         let found = match self.refusal(&request) {

@@ -70,7 +70,8 @@ fn pictures_that_are_left_out_are_named() {
     let found = told(&root);
     assert!(found.contains("2 other files ignored"), "{found}");
     assert!(
-        found.contains("pictures without directions are left out:") && found.contains("tl40 pl0"),
+        found.contains("pictures without directions, or of those that are dropped, are left out:")
+            && found.contains("tl40 pl0"),
         "{found}"
     );
     // One that is missing for it.

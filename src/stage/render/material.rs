@@ -14,6 +14,7 @@ use crate::shape::{Area, Size};
 use crate::stage::image::{PlaneOptions, model_of, of_stage};
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::model::{self, Model, Stage};
+use crate::store::recognise::article;
 use crate::words::counted;
 use crate::zarr::Store;
 
@@ -44,8 +45,9 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
     let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
     if kind != model::KIND && options.plane.is_some() {
         return Err(Error::usage(format!(
-            "{}: an endless plane is made of a model, got a {kind}",
-            path.display()
+            "{}: an endless plane is made of a model, got {}",
+            path.display(),
+            article(kind)
         )));
     }
     if kind == model::KIND {

@@ -211,7 +211,15 @@ mod tests {
         assert_eq!(told(&[(0.0, 0.0)]), Vec::<String>::new());
         assert_eq!(told(&[(0.0, 0.0), (75.0, 0.0)]), Vec::<String>::new());
         assert!(told(&[(0.0, 0.0), (1.309, 3.0)])[0].contains("radians"));
-        assert!(told(&[(15.0, 0.0), (90.0, 0.0)])[0].contains("a light is 90.0 degrees"));
+        assert!(told(&[(15.0, 0.0), (90.0, 0.0)])[0].contains("lights are up to 90.0 degrees"));
+        // One option reads both sides, and what is read already stays so.
+        let mut both = contents(&["Y"], &[(15.0, 0.0), (90.0, 0.0)]);
+        both.views.clone_from(&both.lights);
+        let [note] = doubtful_angles(&both, None).try_into().unwrap();
+        assert!(note.contains("views and lights") && note.contains("--polar elevation reads"), "{note}");
+        both.views = vec![Direction::from_degrees(0.0, 0.0)];
+        let [note] = doubtful_angles(&both, Some(Side::Views)).try_into().unwrap();
+        assert!(note.contains("--polar elevation reads"), "{note}");
     }
 
     #[test]

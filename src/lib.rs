@@ -114,6 +114,8 @@ pub mod random;
 #[doc(hidden)]
 pub mod text;
 #[doc(hidden)]
+pub mod vector;
+#[doc(hidden)]
 pub mod words;
 #[doc(hidden)]
 pub mod zarr;

@@ -82,15 +82,7 @@ impl Axis {
     fn sums(&self, rows: &mut [f64], spare: &mut [f64], width: usize) {
         let length = rows.len() / width;
         if length % 2 == 1 {
-            spare.fill(0.0);
-            for (frequency, to) in spare.chunks_exact_mut(width).enumerate() {
-                for (place, from) in rows.chunks_exact(width).enumerate() {
-                    let weight = self.cosine(length, place, frequency);
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
-                }
-            }
-            rows.copy_from_slice(spare);
-            return;
+            return weighted(rows, spare, width, |frequency, place| self.cosine(length, place, frequency));
         }
         let half = length / 2;
         {
@@ -126,15 +118,7 @@ impl Axis {
     fn waves(&self, rows: &mut [f64], spare: &mut [f64], width: usize) {
         let length = rows.len() / width;
         if length % 2 == 1 {
-            spare.fill(0.0);
-            for (place, to) in spare.chunks_exact_mut(width).enumerate() {
-                for (frequency, from) in rows.chunks_exact(width).enumerate() {
-                    let weight = self.cosine(length, place, frequency);
-                    to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
-                }
-            }
-            rows.copy_from_slice(spare);
-            return;
+            return weighted(rows, spare, width, |place, frequency| self.cosine(length, place, frequency));
         }
         let half = length / 2;
         {
@@ -162,6 +146,18 @@ impl Axis {
             }
         }
     }
+}
+
+/// Each row becomes the sum of all rows, each times its weight there.
+fn weighted(rows: &mut [f64], spare: &mut [f64], width: usize, weight: impl Fn(usize, usize) -> f64) {
+    spare.fill(0.0);
+    for (at, to) in spare.chunks_exact_mut(width).enumerate() {
+        for (number, from) in rows.chunks_exact(width).enumerate() {
+            let weight = weight(at, number);
+            to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
+        }
+    }
+    rows.copy_from_slice(spare);
 }
 
 #[cfg(test)]

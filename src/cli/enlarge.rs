@@ -2,7 +2,6 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use btfkit::error::{Error, Result};
-use btfkit::method::coherent::JITTER_ONE;
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
@@ -66,8 +65,8 @@ pub(super) struct Enlarge {
     shard: Shard,
     /// How far pieces are shifted at random, from 0 to 1 (coherent). More repeats less; less fits better [default: 0.5,
     /// and 0 for regular materials]
-    #[arg(long, value_parser = number::share)]
-    jitter: Option<f64>,
+    #[arg(long, value_parser = number::jitter)]
+    jitter: Option<u32>,
     /// Do not store the array `source`, which says which texel of the tile each texel is (all but paper)
     #[arg(long)]
     no_source: bool,
@@ -176,11 +175,9 @@ impl Enlarge {
                 keep_normals,
                 band_rows: self.band.map(|rows| rows as usize),
             }),
-            Method::Coherent => By::Coherent(coherent::Options {
-                jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
-                keep_source,
-                keep_normals,
-            }),
+            Method::Coherent => {
+                By::Coherent(coherent::Options { jitter: self.jitter, keep_source, keep_normals })
+            }
             Method::Repeat => pieces(Pieces::Repeat),
             Method::Tiles => pieces(Pieces::Tiles(self.tiles.unwrap_or(TILES))),
             Method::Roller => pieces(Pieces::Roller),

@@ -1,5 +1,7 @@
 //! Numbers of the command line: one parser for each range that an option may have. What is not finite is none.
 
+use btfkit::method::coherent::JITTER_ONE;
+
 /// A finite number in a range that `holds` says and `expected` names.
 fn number(text: &str, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64, String> {
     let number = text.trim().parse::<f64>().ok().filter(|&number| number.is_finite() && holds(number));
@@ -20,6 +22,11 @@ pub(super) fn count(text: &str) -> Result<usize, String> {
 /// From 0 to 1.
 pub(super) fn share(text: &str) -> Result<f64, String> {
     number(text, "a number from 0 to 1", |number| (0.0..=1.0).contains(&number))
+}
+
+/// Jitter from 0 to 1, in the units of a plane.
+pub(super) fn jitter(text: &str) -> Result<u32, String> {
+    Ok((share(text)? * f64::from(JITTER_ONE)).round() as u32)
 }
 
 /// A reflectance that can be white.

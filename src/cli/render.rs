@@ -2,17 +2,16 @@ use std::path::PathBuf;
 
 use btfkit::disk::output::Made;
 use btfkit::error::Result;
-use btfkit::method::coherent::JITTER_ONE;
 use btfkit::picture::{Encoding, Ending};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
-use btfkit::stage::image::PlaneOptions;
 use btfkit::stage::render::{self, CameraOptions, EnvironmentOptions, Motion, Options, Shape};
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::given::Given;
+use super::scene::PlaneArgs;
 use super::{Console, found, number};
 
 /// Longest side of a picture, pixels.
@@ -117,12 +116,8 @@ pub(super) struct Render {
     /// Cover the object with the endless surface of a model, instead of its tile
     #[arg(long)]
     plane: bool,
-    /// Seed of the endless surface
-    #[arg(long, requires = "plane", default_value_t = 1)]
-    seed: u32,
-    /// Jitter of the endless surface, from 0 to 1, as in `btf enlarge`
-    #[arg(long, requires = "plane", value_parser = number::share)]
-    jitter: Option<f64>,
+    #[command(flatten)]
+    variation: PlaneArgs,
     /// Show five ways to cover the object with the material of a model, side by side with labels: the tile repeated, two
     /// tiles that join each other, the paper's rule with a 2D and a 3D random field, and the coherent rule
     #[arg(long, conflicts_with_all = ["frames", "plane", "model", "show_environment"])]
@@ -198,10 +193,7 @@ impl Render {
         }
         let options = Options {
             model: self.model.clone(),
-            plane: self.plane.then(|| PlaneOptions {
-                seed: self.seed,
-                jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
-            }),
+            plane: self.plane.then(|| self.variation.options()),
             shape: match (&self.mesh, self.shape) {
                 (Some(path), _) => Shape::Mesh(path.clone()),
                 (None, ShapeName::Flat) => Shape::Flat,

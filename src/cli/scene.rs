@@ -1,7 +1,6 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
-use btfkit::method::coherent::JITTER_ONE;
 use btfkit::shape::Area;
 use btfkit::stage::image::{Options, PlaneOptions, Subject, Values};
 use btfkit::store::{measurement, model};
@@ -41,12 +40,25 @@ pub(super) struct SceneArgs {
     /// be negative
     #[arg(long)]
     plane: bool,
+    #[command(flatten)]
+    variation: PlaneArgs,
+}
+
+/// Which endless surface of a model.
+#[derive(Args)]
+pub(super) struct PlaneArgs {
     /// Seed of the endless surface
     #[arg(long, requires = "plane", default_value_t = 1)]
     seed: u32,
     /// Jitter of the endless surface, from 0 to 1, as in `btf enlarge`
-    #[arg(long, requires = "plane", value_parser = number::share)]
-    jitter: Option<f64>,
+    #[arg(long, requires = "plane", value_parser = number::jitter)]
+    jitter: Option<u32>,
+}
+
+impl PlaneArgs {
+    pub(super) fn options(&self) -> PlaneOptions {
+        PlaneOptions { seed: self.seed, jitter: self.jitter }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -95,10 +107,7 @@ impl SceneArgs {
                 (Some(ValuesName::Components), _) => Values::Components,
                 _ => Values::Measured(self.measurement.clone()),
             },
-            plane: self.plane.then(|| PlaneOptions {
-                seed: self.seed,
-                jitter: self.jitter.map(|jitter| (jitter * f64::from(JITTER_ONE)).round() as u32),
-            }),
+            plane: self.plane.then(|| self.variation.options()),
             window: self.window,
         }
     }

@@ -1,8 +1,8 @@
 //! Where a picture is taken from.
 
-use super::vector::{Vector, along, cross, minus, unit};
 use crate::error::{Error, Result};
 use crate::shape::Size;
+use crate::vector::{Vector, along, cross, minus, unit};
 
 /// How a camera stands and what it sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl Camera {
         }
         let half = libm::tan(view.fov_deg.to_radians() / 2.0);
         let distance =
-            if view.orthographic { super::vector::length(minus(view.target, view.eye)) } else { 1.0 };
+            if view.orthographic { crate::vector::length(minus(view.target, view.eye)) } else { 1.0 };
         let step = 2.0 * half * distance / size.height.min(size.width) as f64;
         Ok(Self { view, right, up: cross(right, forward), forward, step, size })
     }

@@ -1,7 +1,7 @@
 //! Corners of triangles, as files of meshes have them.
 
-use super::vector::Vector;
 use crate::error::{Error, Result};
+use crate::vector::Vector;
 use crate::words::counted;
 
 /// A corner of a triangle, as files have it.

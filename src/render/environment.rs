@@ -6,10 +6,10 @@
 use btfkit_formats::{Limits, Samples, picture};
 
 use super::light::{Light, Place};
-use super::vector::{Vector, along, unit};
 use crate::color::{Decoder, LUMINANCE_WEIGHTS, Transfer};
 use crate::error::{Error, Result};
 use crate::shape::Size;
+use crate::vector::{Vector, along, unit};
 
 /// A latitude-longitude picture of what surrounds a scene: its middle lies behind the object, its left edge behind the
 /// default camera, its top row above.

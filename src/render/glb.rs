@@ -8,8 +8,8 @@ use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 
 use super::corner::{Corner, expect_at_most};
-use super::vector::{Vector, cross};
 use crate::error::{Error, Result};
+use crate::vector::{Vector, cross};
 
 /// Nodes within nodes, deeper than which a file is refused: it may hold itself.
 const DEEPEST: usize = 64;
@@ -153,7 +153,7 @@ impl Reader<'_> {
         let times = |columns: &[Vector; 3], v: [f64; 4]| -> Vector {
             std::array::from_fn(|row| (0..3).map(|n| columns[n][row] * v[n]).sum())
         };
-        let turns_over = super::vector::dot(columns[0], cofactors[0]) < 0.0;
+        let turns_over = crate::vector::dot(columns[0], cofactors[0]) < 0.0;
         let corner = |at: usize| -> Option<Corner> {
             let [s, t, ..] = *textures.get(at)?;
             let place = times(&columns, *places.get(at)?);

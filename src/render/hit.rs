@@ -1,7 +1,7 @@
 //! Where a ray meets a surface, and the frame of the texture there.
 
 use super::camera::Ray;
-use super::vector::{Vector, along, cross, dot, unit};
+use crate::vector::{Vector, along, cross, dot, unit};
 
 /// Nearer than this, a ray meets what it left.
 pub(super) const NEAR: f64 = 1e-7;

@@ -6,8 +6,8 @@
 
 use super::corner::Corner;
 use super::mesh::Mesh;
-use super::vector::{Vector, along, cross, length, minus, unit};
 use crate::error::Result;
+use crate::vector::{Vector, along, cross, length, minus, unit};
 
 /// Points along a profile, and across.
 const ALONG: usize = 160;

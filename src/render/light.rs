@@ -2,7 +2,7 @@
 
 use btfkit_formats::Direction;
 
-use super::vector::{Vector, length, minus, unit};
+use crate::vector::{Vector, length, minus, unit};
 
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]

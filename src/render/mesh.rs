@@ -8,9 +8,9 @@ use nalgebra::{Point3, Vector3};
 use super::camera::Ray;
 use super::corner::Corner;
 use super::hit::{Frame, Hit, NEAR};
-use super::vector::{Vector, along, cross, dot, length, minus, unit};
 use super::{glb, obj};
 use crate::error::{Error, Result};
+use crate::vector::{Vector, along, cross, dot, length, minus, unit};
 
 /// A triangle as it is asked for.
 struct Triangle {

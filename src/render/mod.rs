@@ -20,7 +20,6 @@ pub mod surface;
 mod tests;
 pub mod texture;
 mod trace;
-pub mod vector;
 
 pub use environment::Environment;
 pub use trace::{Background, Scene, render};

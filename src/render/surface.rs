@@ -3,7 +3,7 @@
 use super::camera::Ray;
 use super::hit::{Frame, Hit, NEAR};
 use super::mesh::Mesh;
-use super::vector::{Vector, along, dot, unit};
+use crate::vector::{Vector, along, dot, unit};
 
 /// Half the height of the cylinder; it fits into the sphere of radius 1.
 const CYLINDER_HEIGHT: f64 = 0.8;

@@ -11,7 +11,6 @@ use super::light::{Light, Place};
 use super::mesh::Mesh;
 use super::surface::Surface;
 use super::texture::Texture;
-use super::vector::{Vector, along, dot, unit};
 use super::{Background, Environment, Scene, interior, render};
 use crate::method::value::evaluator::Evaluator;
 use crate::method::value::table::ClusterTable;
@@ -19,6 +18,7 @@ use crate::method::value::triangulation::triangulate;
 use crate::picture::Picture;
 use crate::run::{Context, progress::Silent};
 use crate::shape::Size;
+use crate::vector::{Vector, along, dot, unit};
 
 const SIZE: Size = Size { height: 48, width: 48 };
 

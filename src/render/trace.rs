@@ -8,13 +8,13 @@ use super::hit::Hit;
 use super::light::Light;
 use super::surface::Surface;
 use super::texture::{Reader, Texture};
-use super::vector::{along, dot, turned};
 use crate::error::{Error, Result};
 use crate::method::value::evaluator::{Evaluator, tinted};
 use crate::method::value::table::{Mixture, Tinted, Values};
 use crate::picture::Picture;
 use crate::run::Context;
 use crate::shape::Size;
+use crate::vector::{along, dot, turned};
 
 /// Rows that are computed before a stop is looked for.
 const BAND_ROWS: usize = 16;

@@ -7,7 +7,7 @@ use super::Options;
 use super::container::Container;
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::method::coherent::{Appearance, JITTER_ONE};
+use crate::method::coherent::{Appearance, default_jitter};
 use crate::run::Context;
 use crate::shape::{Area, Size};
 use crate::stage::image::{model_of, of_stage};
@@ -238,13 +238,12 @@ fn put_appearance(container: &mut Container, appearance: &Appearance) {
             json!({"dims": level.dims, "shift": level.shift, "passes": level.passes, "repetition": level.repetition})
         })
         .collect();
-    // As `Plane::variation`.
-    let jitter = if appearance.lattice.0.is_empty() { JITTER_ONE / 2 } else { 0 };
     container.say(
         "appearance",
         json!({
             "exemplar": [exemplar.y, exemplar.x, exemplar.size.height, exemplar.size.width],
-            "wraps": appearance.wraps, "lattice": appearance.lattice.0, "levels": levels, "jitter": jitter,
+            "wraps": appearance.wraps, "lattice": appearance.lattice.0, "levels": levels,
+            "jitter": default_jitter(&appearance.lattice),
         }),
     );
     let features = appearance.features.as_flattened();

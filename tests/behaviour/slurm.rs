@@ -72,6 +72,13 @@ fn slurm(inputs: &[&Path], out: &Path, more: &[&str]) -> Command {
     command
 }
 
+/// Jobs for the archive of the fixture, run by a program of this text instead of btf.
+fn jobs_of(stubs: &Stubs, jobs: &Path, program: &str) {
+    succeed(&mut slurm(&[&fixture().archive()], jobs, &[]));
+    let program = stubs.program("program", program);
+    set(&jobs.join("settings.sh"), "btf", program.to_str().unwrap());
+}
+
 #[test]
 fn jobs_for_a_material_with_an_awkward_name_make_what_one_process_makes() {
     let stubs = Stubs::new();
@@ -162,13 +169,12 @@ fn only_a_task_that_was_stopped_is_run_again_and_not_for_ever() {
     let stubs = Stubs::new();
     let folder = tempfile::tempdir().unwrap();
     let jobs = folder.path().join("jobs");
-    succeed(&mut slurm(&[&fixture().archive()], &jobs, &[]));
     // Ends with each of these in turn, the last one for good.
-    let program = stubs.program(
-        "program",
+    jobs_of(
+        &stubs,
+        &jobs,
         r#"read -r code rest <"$CODES"; [ -z "$rest" ] || echo "$rest" >"$CODES"; exit "$code""#,
     );
-    set(&jobs.join("settings.sh"), "btf", program.to_str().unwrap());
     set(&jobs.join("settings.sh"), "patience", "0");
     let codes = folder.path().join("codes");
     let run = |listed: &str, state: &str, restarts: &str| {
@@ -206,13 +212,12 @@ fn a_task_that_is_told_to_stop_tells_its_program_and_waits_for_it() {
     let stubs = Stubs::new();
     let folder = tempfile::tempdir().unwrap();
     let jobs = folder.path().join("jobs");
-    succeed(&mut slurm(&[&fixture().archive()], &jobs, &[]));
     // Ends only after it was told, and some time after that.
-    let program = stubs.program(
-        "program",
+    jobs_of(
+        &stubs,
+        &jobs,
         r#"trap 'sleep 0.2; echo told >>"$CODES"; exit 75' TERM; echo begun >>"$CODES"; while :; do sleep 0.05; done"#,
     );
-    set(&jobs.join("settings.sh"), "btf", program.to_str().unwrap());
     let codes = folder.path().join("codes");
     let mut task = stubs.with(Command::new("bash"));
     task.arg("import.sh").current_dir(&jobs).env("CODES", &codes);

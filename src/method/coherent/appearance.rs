@@ -25,6 +25,11 @@ pub const MOST_SIDE: usize = 32767;
 /// A jitter of a whole spacing.
 pub const JITTER_ONE: u32 = 256;
 
+/// Jitter unless another is asked for: half a spacing, and none where it would break a lattice.
+pub(crate) fn default_jitter(lattice: &WaveCounts) -> u32 {
+    if lattice.0.is_empty() { JITTER_ONE / 2 } else { 0 }
+}
+
 /// Number of levels of an exemplar: its shorter side holds at least four of the coarsest spacing.
 pub fn levels_of(exemplar: Size) -> usize {
     let side = exemplar.height.min(exemplar.width);

@@ -17,6 +17,7 @@ mod region;
 mod shift;
 mod start;
 
+pub(crate) use appearance::default_jitter;
 pub use appearance::{
     Appearance, Basis, FEATURES, FINE_DIMS, INPUTS, JITTER_ONE, LEVELS_MOST, MOST_SIDE, dims_of, levels_of,
     passes_of, repetition_of,

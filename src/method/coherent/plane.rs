@@ -1,6 +1,6 @@
 //! The endless plane: any window of it, alone.
 
-use super::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, dims_of, sides_at};
+use super::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, default_jitter, dims_of, sides_at};
 use super::appearance_image::{AppearanceImage, Features};
 use super::region::Region;
 use super::start::Start;
@@ -21,9 +21,6 @@ const REACH_BEYOND: [usize; 2] = [2, 0];
 
 /// What each pass reaches beyond a side of the exemplar where repetition costs.
 const REACH_REPEATING: usize = 6;
-
-/// Jitter where there is no lattice: half a spacing.
-const JITTER: u32 = JITTER_ONE / 2;
 
 /// Shorter side from which on the border of an exemplar that does not wrap is kept.
 const LEAST_BORDERED: usize = 8;
@@ -113,8 +110,7 @@ impl Plane {
 
     /// The variation of a seed as it is by default.
     pub fn variation(&self, seed: u32) -> Variation {
-        let jitter = if self.lattice.0.is_empty() { JITTER } else { 0 };
-        Variation { seed, jitter, wrap: None }
+        Variation { seed, jitter: default_jitter(&self.lattice), wrap: None }
     }
 
     /// Sides of an output that joins at its own borders are multiples of this.

@@ -158,21 +158,28 @@ pub fn look_up<T: Copy>(index: &[u16], palette: &[T], picture: &mut [T]) -> Resu
     if index.len() != picture.len() {
         return Err(Error::internal("a picture of another size than its index"));
     }
-    let Some(&last) = palette.last() else { return Err(Error::internal("a palette of no colour")) };
+    expect_entries(index, palette.len())?;
+    let Some(&last) = palette.last() else { return Ok(()) };
     // Padded to what a number can be, so that none has to be checked while colours are copied.
-    let most = index.iter().copied().max().map_or(0, usize::from);
-    if most >= palette.len() {
-        let (found, known) = (most, palette.len());
-        return Err(Error::input(format!(
-            "the index refers to cluster {found}, beyond the {known} of the model"
-        )));
-    }
     if let Some(narrow) = padded::<T, 256>(palette, last) {
         index.iter().zip(picture).for_each(|(&entry, to)| *to = narrow[usize::from(entry as u8)]);
     } else {
         index.iter().zip(picture).for_each(|(&entry, to)| *to = palette[usize::from(entry)]);
     }
     Ok(())
+}
+
+/// Checks that a model has all clusters that an index refers to.
+///
+/// # Errors
+/// Where it has not.
+pub(crate) fn expect_entries(index: &[u16], clusters: usize) -> Result<()> {
+    match index.iter().max() {
+        Some(&cluster) if usize::from(cluster) >= clusters => Err(Error::input(format!(
+            "the index refers to cluster {cluster}, beyond the {clusters} of the model"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// A palette with so many colours, where it has no more.

@@ -6,7 +6,8 @@
 
 use btfkit_formats::Direction;
 
-use super::triangulation::{Interpolator, cross, dot};
+use super::triangulation::Interpolator;
+use crate::vector::{cross, dot};
 
 /// Side of the image of first triangles.
 const GRID: usize = 64;

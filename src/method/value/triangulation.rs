@@ -4,6 +4,8 @@ use delaunator::{Point, triangulate as planar_delaunay};
 
 use btfkit_formats::Direction;
 
+use crate::vector::{cross, dot};
+
 /// Two directions closer than this (chord length) are the same.
 const SAME_DIRECTION: f64 = 1e-7;
 
@@ -193,14 +195,6 @@ fn border_edges(triangles: &[[usize; 3]]) -> Vec<[usize; 2]> {
 
 fn least(weights: &[f64; 3]) -> f64 {
     weights.iter().copied().fold(f64::INFINITY, f64::min)
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::disk::output::Made;
 use crate::error::{Error, Result};
 use crate::method::tile::Tile;
 use crate::method::value::evaluate::{Appearance, add};
+use crate::method::value::evaluator;
 use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::{Encoding, Ending, Picture, stream};
 use crate::run::progress::Counted;
@@ -306,17 +307,7 @@ fn appearance_of(model: &Model, view: Direction, light: Direction) -> Result<App
 
 /// Looks up the colour of each texel's cluster.
 pub fn look_up(size: Size, index: &[u16], colors: &[[f32; 3]]) -> Result<Picture> {
-    expect_colors(index, colors)?;
-    Ok(Picture::linear(size, index.iter().map(|&cluster| colors[usize::from(cluster)]).collect()))
-}
-
-/// Checks that every cluster has a colour.
-fn expect_colors(index: &[u16], colors: &[[f32; 3]]) -> Result<()> {
-    match index.iter().max() {
-        Some(&cluster) if usize::from(cluster) >= colors.len() => Err(Error::input(format!(
-            "the index refers to cluster {cluster}, beyond the {} of the model",
-            colors.len()
-        ))),
-        _ => Ok(()),
-    }
+    let mut pixels = vec![[0.0; 3]; index.len()];
+    evaluator::look_up(index, colors, &mut pixels)?;
+    Ok(Picture::linear(size, pixels))
 }

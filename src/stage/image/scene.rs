@@ -6,10 +6,11 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::recipe::SceneRecipe;
-use super::{Appearance, expect_colors, mixed};
+use super::{Appearance, mixed};
 use crate::color::Decoder;
 use crate::error::{Error, ErrorKind, Result};
 use crate::method::coherent::{Plane, Variation};
+use crate::method::value::evaluator::expect_entries;
 use crate::picture::{Meaning, Picture, false_color};
 use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size};
@@ -224,7 +225,7 @@ impl Scene {
             Source::Tile(picture) => Pixels::Own(picture.part(window).pixels),
             Source::Clusters { enlarged, colors } | Source::Index { enlarged, colors } => {
                 let index = enlarged.read(window)?;
-                expect_colors(&index, colors)?;
+                expect_entries(&index, colors.len())?;
                 Pixels::Clusters { index, colors }
             }
             Source::Sources { enlarged, tile } => {

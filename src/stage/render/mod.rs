@@ -13,13 +13,13 @@ use crate::error::{Error, Result};
 use crate::picture::{Encoding, Picture, stream};
 use crate::render::camera::Camera;
 use crate::render::light::{Light, Place};
-use crate::render::vector::Vector;
 use crate::render::{Background, Environment, Scene};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
+use crate::vector::Vector;
 use crate::words::counted;
 
 pub use sheets::compare;

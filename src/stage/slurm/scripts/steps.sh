@@ -26,7 +26,7 @@ once() {
     worker=$!
     [ -z "$stopped" ] || kill -TERM "$worker" 2>/dev/null
     # A signal ends `wait` early.
-    while wait "$worker"; code=$?; kill -0 "$worker" 2>/dev/null; do :; done
+    while wait "$worker"; kill -0 "$worker" 2>/dev/null; do :; done
     wait "$worker"
     code=$?
     worker=''

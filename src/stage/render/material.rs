@@ -22,16 +22,22 @@ use crate::zarr::Store;
 const PLANE_PIECE_BYTES: u64 = 4 * 24 * 512 * 512;
 
 /// A material.
-pub(super) struct Material {
-    pub(super) evaluator: Evaluator,
-    pub(super) texture: Texture,
+pub struct Material {
+    /// Its values under any view and light.
+    pub evaluator: Evaluator,
+    /// Which entry of the evaluator each texel is.
+    pub texture: Texture,
     /// Size of the texture and whether it repeats; none where it is endless.
-    pub(super) bounds: Option<(Size, bool)>,
-    pub(super) notes: Vec<String>,
+    pub bounds: Option<(Size, bool)>,
+    /// What a user should know of it, a sentence each.
+    pub notes: Vec<String>,
 }
 
 /// Opens what is to be shown; `beside` is memory that is taken already.
-pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
+///
+/// # Errors
+/// Those of opening the stores, and of memory.
+pub fn open(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
     let path = &options.source;
     let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND]).map_err(|error| {
         match crate::store::kind_of(path) {

@@ -10,6 +10,7 @@ use crate::method::value::evaluator::Evaluator;
 use crate::method::value::table::ClusterTable;
 use crate::render::texture::{Maker, PIECE_BYTES, Pieces, Texture};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::shape::{Area, Size};
 use crate::stage::image::{PlaneOptions, model_of, of_stage};
 use crate::store::enlarged::{self, Enlarged};
@@ -21,6 +22,9 @@ use crate::zarr::Store;
 /// Memory of a texel of a plane while a piece of it is made, with what lies around the piece.
 const PLANE_PIECE_BYTES: u64 = 4 * 24 * 512 * 512;
 
+/// Memory of a texel of a tile: its number, where it was cut from, and what is read beside.
+const INDEX_BYTES: u64 = 16;
+
 /// A material.
 pub(super) struct Material {
     pub(super) evaluator: Evaluator,
@@ -30,8 +34,8 @@ pub(super) struct Material {
     pub(super) notes: Vec<String>,
 }
 
-/// Opens what is to be shown; `beside` is memory that is taken already.
-pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
+/// Opens what is to be shown.
+pub(super) fn open(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
     let path = &options.source;
     let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND]).map_err(|error| {
         match crate::store::kind_of(path) {
@@ -52,16 +56,16 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
     }
     if kind == model::KIND {
         let model = Model::open(path)?;
-        let (evaluator, notes) = evaluator(&model, beside, context)?;
+        let (evaluator, notes) = evaluator(&model, room, context)?;
         let (texture, bounds) = match options.plane {
-            Some(which) => (endless(&model, which, context)?, None),
-            None => tile(&model, None)?,
+            Some(which) => (endless(&model, which, room, context)?, None),
+            None => tile(&model, None, room)?,
         };
         return Ok(Material { evaluator, texture, bounds, notes });
     }
     let enlarged = Enlarged::open(path)?;
     let model = model_of(&enlarged, path, options.model.as_deref())?;
-    let (evaluator, mut notes) = evaluator(&model, beside, context)?;
+    let (evaluator, mut notes) = evaluator(&model, room, context)?;
     let missing = enlarged.shards().texels() - enlarged.shards_done();
     if missing > 0 {
         notes.push(format!("{} is not complete: {} missing", path.display(), counted(missing, "shard")));
@@ -71,14 +75,14 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
         let window = area.within_first_quadrant().ok_or_else(|| Error::internal("a window below 0"))?;
         enlarged.read(window)
     });
-    let texture = Texture::Pieces(Pieces::new(read, bounds, context.work_bytes() / 4));
+    let texture = pieces(read, bounds, room);
     Ok(Material { evaluator, texture, bounds, notes })
 }
 
 /// The clusters of a model, decoded.
 pub(super) fn evaluator(
     model: &Model,
-    beside: u64,
+    room: &mut Room,
     context: &Context<'_>,
 ) -> Result<(Evaluator, Vec<String>)> {
     let [views, lights] = model.directions()?;
@@ -86,7 +90,8 @@ pub(super) fn evaluator(
     let clusters = of_stage(model, Stage::Cluster, Model::clusters)?;
     let bytes = ClusterTable::bytes([clusters, views.len(), lights.len()]);
     let what = format!("the values of {}", counted(clusters, "cluster"));
-    context.require(&what, bytes.saturating_add(beside + (32 << 20) + PIECE_BYTES))?;
+    room.require(&what, bytes.saturating_add((32 << 20) + PIECE_BYTES))?;
+    room.take(&what, bytes)?;
     let mut table = ClusterTable::new(views.len(), lights.len());
     for part in model.representative_chunks()? {
         context.check_stop()?;
@@ -111,16 +116,31 @@ pub(super) fn evaluator(
     Ok((Evaluator::new((&views, &view_triangles), (&lights, &light_triangles), table), notes))
 }
 
+/// A texture that is made piece by piece, of which a quarter of what is left is kept.
+pub(super) fn pieces(make: Maker, bounds: Option<(Size, bool)>, room: &Room) -> Texture {
+    Texture::Pieces(Pieces::new(make, bounds, room.left() / 4))
+}
+
 /// The tile of a model; `wraps` is asked for, or as it is.
-pub(super) fn tile(model: &Model, wraps: Option<bool>) -> Result<(Texture, Option<(Size, bool)>)> {
+pub(super) fn tile(
+    model: &Model,
+    wraps: Option<bool>,
+    room: &Room,
+) -> Result<(Texture, Option<(Size, bool)>)> {
     let tile = model.tile()?;
-    let index = of_stage(model, Stage::Cluster, Model::index)?;
     let (size, wraps) = (tile.size, wraps.unwrap_or(tile.wraps));
+    room.require(&format!("a tile of {size}"), INDEX_BYTES * size.texels() as u64)?;
+    let index = of_stage(model, Stage::Cluster, Model::index)?;
     Ok((Texture::Whole { size, wraps, index }, Some((size, wraps))))
 }
 
 /// The endless plane of a model.
-pub(super) fn endless(model: &Model, which: PlaneOptions, context: &Context<'_>) -> Result<Texture> {
+pub(super) fn endless(
+    model: &Model,
+    which: PlaneOptions,
+    room: &Room,
+    context: &Context<'_>,
+) -> Result<Texture> {
     let size = model.tile()?.size;
     let appearance = of_stage(model, Stage::Appearance, Model::appearance)?;
     let index = of_stage(model, Stage::Cluster, Model::index)?;
@@ -128,10 +148,11 @@ pub(super) fn endless(model: &Model, which: PlaneOptions, context: &Context<'_>)
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
-    context.require("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
+    let mut room = *room;
+    room.take("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
     let make: Maker = Box::new(move |area: Area| {
         let sources = plane.window(&variation, area.y, area.x, area.size)?;
         Ok(sources.into_iter().map(|texel| index[texel as usize]).collect())
     });
-    Ok(Texture::Pieces(Pieces::new(make, None, context.work_bytes() / 4)))
+    Ok(pieces(make, None, &room))
 }

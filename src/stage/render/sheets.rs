@@ -15,6 +15,7 @@ use crate::method::field::{self, Boundary, CarKind, Coordinates, Extent, Gains, 
 use crate::method::index::nearest::NearestNormals;
 use crate::method::index::scan::{Neighbours, Scan};
 use crate::method::value::evaluator::Evaluator;
+use crate::method::value::table::Table;
 use crate::picture::drawing::Canvas;
 use crate::picture::{Encoding, Picture};
 use crate::render::camera::Camera;
@@ -25,6 +26,7 @@ use crate::run::progress::Counted;
 use crate::shape::{Area, Size};
 use crate::stage::fit;
 use crate::stage::image::{PlaneOptions, of_stage};
+use crate::stage::values::{By, TileValues};
 use crate::store::model::{Model, Stage};
 
 /// Panels beside each other.
@@ -48,7 +50,8 @@ const SEED: u64 = 1;
 /// What is opened once for all panels.
 struct Subject<'a> {
     model: Model,
-    evaluator: Evaluator,
+    values: TileValues,
+    evaluator: Evaluator<Table>,
     options: &'a Options,
     context: &'a Context<'a>,
 }
@@ -71,11 +74,13 @@ pub fn compare(
     let pixels = (sheet.texels() as u64) * super::PIXEL_BYTES + encoding.memory_bytes(sheet);
     context.require(&format!("a sheet of {sheet}"), pixels)?;
     let model = Model::open(&options.source)?;
-    let (evaluator, mut notes) = material::evaluator(&model, pixels, context)?;
-    let subject = Subject { model, evaluator, options, context };
+    let values = TileValues::of_model(&model, By::Clusters, context)?;
+    let (evaluator, mut notes) = material::evaluator(values, pixels, context)?;
+    let values = TileValues::of_model(&model, By::Clusters, context)?;
+    let subject = Subject { model, values, evaluator, options, context };
     type Way<'a> = (&'static str, Box<dyn Fn() -> Result<Texture> + 'a>);
     let ways: [Way<'_>; 5] = [
-        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.model, Some(true))?.0))),
+        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.values, Some(true))?.0))),
         ("two tiles", Box::new(|| subject.two_tiles())),
         ("paper, 2D CAR", Box::new(|| subject.paper(CarKind::Car2d))),
         ("paper, 3D CAR", Box::new(|| subject.paper(CarKind::Car3d))),
@@ -83,7 +88,7 @@ pub fn compare(
             "coherent",
             Box::new(|| {
                 let which = options.plane.unwrap_or(PlaneOptions { seed: SEED as u32, jitter: None });
-                material::endless(&subject.model, which, context)
+                material::endless(&subject.model, &subject.values, which, context)
             }),
         ),
     ];
@@ -155,7 +160,7 @@ impl Subject<'_> {
 
     /// As much of the tile as a panel holds.
     fn flat_tile(&self) -> Result<Picture> {
-        let (texture, bounds) = material::tile(&self.model, None)?;
+        let (texture, bounds) = material::tile(&self.values, None)?;
         let Size { height, width } = bounds.map_or(self.options.size, |(size, _)| size);
         let size = Size::new(height.min(self.options.size.height), width.min(self.options.size.width));
         let options = Options { shape: super::Shape::Flat, size, scale: 1.0, ..self.options.clone() };
@@ -166,11 +171,12 @@ impl Subject<'_> {
     fn two_tiles(&self) -> Result<Texture> {
         let tile = self.model.tile()?;
         let index = of_stage(&self.model, Stage::Cluster, Model::index)?;
-        let exemplar = Exemplar::new(tile.size, tile.wraps, index.clone(), &self.model.distance()?)?;
+        let exemplar = Exemplar::new(tile.size, tile.wraps, index, &self.model.distance()?)?;
         let tiles = self.context.compute(|| Tiles::new(&exemplar, 2, SEED, None))?;
+        let entries = self.values.entries()?;
         let make: Maker = Box::new(move |area: Area| {
             let texels = tiles.window(area.y, area.x, area.size);
-            Ok(texels.into_iter().map(|texel| index[texel as usize]).collect())
+            Ok(texels.into_iter().map(|texel| entries[texel as usize]).collect())
         });
         Ok(Texture::Pieces(Pieces::new(make, None, self.context.work_bytes() / 4)))
     }
@@ -212,6 +218,6 @@ impl Subject<'_> {
             }
             Ok(index)
         })?;
-        Ok(Texture::Whole { size, wraps: false, index })
+        Ok(Texture::Whole { size, wraps: false, index: index.into_iter().map(u32::from).collect() })
     }
 }

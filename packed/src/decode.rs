@@ -2,10 +2,9 @@
 
 use crate::bytes::Reader;
 use crate::error::{Error, Result};
-use crate::grid::{Grid, Shape};
 use crate::header::{Header, expect_numbers};
 use crate::model::{Component, Model};
-use crate::quantise::{strength, value};
+use crate::quantise::strength;
 use crate::range_coder::Decoder;
 use crate::section::{Found, Section};
 use crate::spectrum::Transforms;
@@ -99,17 +98,13 @@ pub fn unpack(file: &[u8]) -> Result<Unpacked> {
         let found = format!("{} bytes behind the last section", reader.left());
         return Err(Error::new(found, "the end of the file").at(reader.at()));
     }
-    let values = |grid: &Grid, shape: &Shape, scale: f64| -> Vec<f64> {
-        grid.numbers(shape).map(|(magnitude, negative)| value(magnitude, negative, step) * scale).collect()
-    };
-    let mean_scale = 1.0 / (texels as f64).sqrt();
     let components =
         stream.bases.iter().zip(&stream.images).zip(strengths).map(|((basis, image), code)| Component {
-            basis: transforms.to_brdf(&values(basis, &stream.brdf, 1.0 / strength(code))),
-            coefficients: transforms.to_image(values(image, &stream.image, 1.0)),
+            basis: transforms.to_brdf(&basis.values(&stream.brdf, step / strength(code))),
+            coefficients: transforms.to_image(image.values(&stream.image, step)),
         });
     let model = Model {
-        mean: transforms.to_brdf(&values(&stream.mean, &stream.brdf, mean_scale)),
+        mean: transforms.to_brdf(&stream.mean.values(&stream.brdf, step / (texels as f64).sqrt())),
         components: components.collect(),
         size: header.size,
         wraps: header.wraps,

@@ -39,6 +39,7 @@ mod search;
 mod section;
 mod spectrum;
 mod stream;
+mod turn;
 
 pub use decode::{Ending, Plane, Unpacked, unpack};
 pub use encode::Packed;

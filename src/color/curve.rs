@@ -59,6 +59,35 @@ impl Curve {
     }
 }
 
+/// Steps of the table of [`Linear`] within one of 255: linear between them, it is within 3e-8.
+const STEPS: usize = 16;
+
+/// From the curve to linear reflectance, many times.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Linear {
+    table: Vec<f32>,
+}
+
+impl Linear {
+    pub(crate) fn new() -> Self {
+        let steps = WHITE as usize * STEPS;
+        let of = |step: usize| srgb_decode(step as f64 / steps as f64) as f32;
+        Self { table: (0..=steps).map(of).collect() }
+    }
+
+    /// Of one value; what is no finite number is 0.
+    #[inline]
+    pub(crate) fn of(&self, value: f32) -> f32 {
+        if !(0.0..WHITE).contains(&value) {
+            let linear = srgb_decode(f64::from(value) / f64::from(WHITE)) as f32;
+            return if linear.is_finite() { linear } else { 0.0 };
+        }
+        let place = value * STEPS as f32;
+        let step = (place as usize).min(self.table.len() - 2);
+        self.table[step] + (place - step as f32) * (self.table[step + 1] - self.table[step])
+    }
+}
+
 fn on_curve(sample: f64, transfer: Transfer) -> f32 {
     let value = match transfer {
         Transfer::Srgb => sample,
@@ -113,6 +142,18 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn the_table_is_the_curve() {
+        let linear = Linear::new();
+        for k in -3000..12_000 {
+            let value = k as f32 * 0.0301;
+            let exact = srgb_decode(f64::from(value) / 255.0);
+            let off = (f64::from(linear.of(value)) - exact).abs();
+            assert!(off <= 2e-7 * exact.abs().max(1.0), "{value}: {off}");
+        }
+        assert_eq!((linear.of(255.0), linear.of(f32::NAN), linear.of(f32::INFINITY)), (1.0, 0.0, 0.0));
     }
 
     #[test]

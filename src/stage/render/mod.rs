@@ -21,6 +21,7 @@ use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
+use crate::stage::values::By;
 use crate::vector::{Vector, length};
 use crate::words::counted;
 
@@ -92,12 +93,14 @@ pub enum Motion {
 /// What to show, on what, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A model (its tile, repeated if its borders join), or an enlarged index.
+    /// A model (its tile, repeated if its borders join), an enlarged index, or a packed model.
     pub source: PathBuf,
     /// The model of an enlarged index, where it is not found by itself.
     pub model: Option<PathBuf>,
     /// Of a model: the endless plane that the coherent rule makes of it.
     pub plane: Option<PlaneOptions>,
+    /// Whose values: those of the clusters where absent, or of the components of a model that has no clusters.
+    pub values: Option<By>,
     /// The object.
     pub shape: Shape,
     /// Size of the picture.
@@ -133,6 +136,7 @@ impl Options {
             source: source.into(),
             model: None,
             plane: None,
+            values: None,
             shape: Shape::Sphere,
             size: Size::new(512, 512),
             samples: None,

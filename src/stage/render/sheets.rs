@@ -15,6 +15,7 @@ use crate::method::field::{self, Boundary, CarKind, Coordinates, Extent, Gains, 
 use crate::method::index::nearest::NearestNormals;
 use crate::method::index::scan::{Neighbours, Scan};
 use crate::method::value::evaluator::Evaluator;
+use crate::method::value::table::Table;
 use crate::picture::drawing::Canvas;
 use crate::picture::{Encoding, Picture};
 use crate::render::camera::Camera;
@@ -27,6 +28,7 @@ use crate::run::progress::Counted;
 use crate::shape::{Area, Size};
 use crate::stage::fit;
 use crate::stage::image::{PlaneOptions, of_stage};
+use crate::stage::values::{By, TileValues};
 use crate::store::model::{Model, Stage};
 
 /// Panels beside each other.
@@ -50,7 +52,8 @@ const SEED: u64 = 1;
 /// What is opened once for all panels.
 struct Subject<'a> {
     model: Model,
-    evaluator: Evaluator,
+    values: TileValues,
+    evaluator: Evaluator<Table>,
     options: &'a Options,
     room: Room,
     context: &'a Context<'a>,
@@ -77,14 +80,17 @@ pub fn compare(
     let surface = objects::surface(options, &mut room, context)?;
     let (lights, _) = lights(options, &surface, &mut room)?;
     let model = Model::open(&options.source)?;
-    let (evaluator, mut notes) = material::evaluator(&model, &mut room, context)?;
-    let subject = Subject { model, evaluator, options, room, context };
+    let values = TileValues::of_model(&model, By::Clusters, context)?;
+    values.take(material::SPARE_BYTES, &mut room)?;
+    let (evaluator, mut notes) = values.into_evaluator(context)?;
+    let values = TileValues::of_model(&model, By::Clusters, context)?;
+    let subject = Subject { model, values, evaluator, options, room, context };
     let (background, shadows) = (Background::Grey(options.background), options.shadows);
     let mut scene =
         Scene { surface, lights, background, shadows, density: 1.0, origin: [0.0; 2], turn_rad: 0.0 };
     type Way<'a> = (&'static str, Box<dyn Fn() -> Result<Texture> + 'a>);
     let ways: [Way<'_>; 5] = [
-        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.model, Some(true), &room)?.0))),
+        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.values, Some(true), &room)?.0))),
         ("two tiles", Box::new(|| subject.two_tiles())),
         ("paper, 2D CAR", Box::new(|| subject.paper(CarKind::Car2d))),
         ("paper, 3D CAR", Box::new(|| subject.paper(CarKind::Car3d))),
@@ -92,7 +98,7 @@ pub fn compare(
             "coherent",
             Box::new(|| {
                 let which = options.plane.unwrap_or(PlaneOptions { seed: SEED as u32, jitter: None });
-                material::endless(&subject.model, which, &room, context)
+                material::endless(&subject.model, &subject.values, which, &room, context)
             }),
         ),
     ];
@@ -165,7 +171,7 @@ impl Subject<'_> {
 
     /// As much of the tile as a panel holds.
     fn flat_tile(&self, scene: &mut Scene) -> Result<Picture> {
-        let (texture, bounds) = material::tile(&self.model, None, &self.room)?;
+        let (texture, bounds) = material::tile(&self.values, None, &self.room)?;
         let Size { height, width } = bounds.map_or(self.options.size, |(size, _)| size);
         let size = Size::new(height.min(self.options.size.height), width.min(self.options.size.width));
         let options = Options { shape: super::Shape::Flat, size, scale: 1.0, ..self.options.clone() };
@@ -176,11 +182,12 @@ impl Subject<'_> {
     fn two_tiles(&self) -> Result<Texture> {
         let tile = self.model.tile()?;
         let index = of_stage(&self.model, Stage::Cluster, Model::index)?;
-        let exemplar = Exemplar::new(tile.size, tile.wraps, index.clone(), &self.model.distance()?)?;
+        let exemplar = Exemplar::new(tile.size, tile.wraps, index, &self.model.distance()?)?;
         let tiles = self.context.compute(|| Tiles::new(&exemplar, 2, SEED, None))?;
+        let entries = self.values.entries()?;
         let make: Maker = Box::new(move |area: Area| {
             let texels = tiles.window(area.y, area.x, area.size);
-            Ok(texels.into_iter().map(|texel| index[texel as usize]).collect())
+            Ok(texels.into_iter().map(|texel| entries[texel as usize]).collect())
         });
         Ok(material::pieces(make, None, &self.room))
     }
@@ -222,6 +229,6 @@ impl Subject<'_> {
             }
             Ok(index)
         })?;
-        Ok(Texture::Whole { size, wraps: false, index })
+        Ok(Texture::Whole { size, wraps: false, index: index.into_iter().map(u32::from).collect() })
     }
 }

@@ -197,12 +197,13 @@ pub struct About {
 /// What a packed model holds.
 ///
 /// # Errors
-/// A file that is none, or is damaged before its first plane ends.
+/// A file that is none, or is damaged before its first plane ends; channels that are not understood.
 pub fn about(path: &Path) -> Result<About> {
-    let file = PackedFile::read(path)?;
-    let (notes, samples, bytes) = (file.notes(), file.sample_type(), file.bytes);
-    let packed::Unpacked { model, planes, .. } = file.unpacked;
-    let values = (model.texels() * model.brdf()) as u64;
+    let file = PackedFile::open(path)?;
+    let (notes, samples) = (file.notes(), file.sample_type());
+    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, .. } = file.outline;
+    let brdf = views.len() * lights.len() * channels.len();
+    let values = (size[0] * size[1] * brdf) as u64;
     let plane = |plane: &packed::Plane| Plane {
         bytes: plane.end,
         components: plane.components,
@@ -210,14 +211,14 @@ pub fn about(path: &Path) -> Result<About> {
     };
     Ok(About {
         kind: "packed model",
-        size: [model.size[1], model.size[0]],
-        wraps: model.wraps,
-        directions: [model.views.len(), model.lights.len()],
+        size: [size[1], size[0]],
+        wraps,
+        directions: [views.len(), lights.len()],
         bytes,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
-        channels: model.channels,
-        texts: model.texts,
+        channels,
+        texts,
         notes,
     })
 }
@@ -240,12 +241,12 @@ pub struct Restored {
 /// # Errors
 /// A file that is none; a model there that is another; those of writing.
 pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restored> {
-    let opened = PackedFile::read(file)?;
-    let (description, notes) = (opened.description()?, opened.notes());
-    context.require("unpacking components", opened.memory_bytes())?;
-    let psnr_db = opened.unpacked.planes.last().map(|plane| plane.decibels).filter(|&found| found > 0.0);
+    let opened = PackedFile::open(file)?;
+    let notes = opened.notes();
+    let from = opened.model(context)?;
+    let psnr_db = opened.outline.planes.last().map(|plane| plane.decibels).filter(|&found| found > 0.0);
     let named = opened.text(MEASUREMENT).map(str::to_owned);
-    let PackedFile { unpacked: packed::Unpacked { model: from, .. }, digest, .. } = opened;
+    let PackedFile { description, digest, .. } = opened;
     let (size, transfer) = (description.size, description.transfer);
     let model = Model::create(path, context)?;
     let named = named.unwrap_or_else(|| format!("packed:{digest}"));
@@ -306,6 +307,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         components,
         strengths: vec![],
         squared_error: None,
+        not_finite: 0,
         psnr_db,
         bytes: model.bytes_of_components(components)?,
         tile_bytes: description.bytes(),

@@ -217,6 +217,14 @@ pub fn open(options: &Options, context: &Context<'_>) -> Result<Subject> {
     Ok(Subject { tile: model.tile()?, measurement, values, digest })
 }
 
+/// Opens the measurement of a model.
+///
+/// # Errors
+/// Where the model is of another one.
+pub fn open_measurement(model: &Path, measurement: &Path) -> Result<Measurement> {
+    open_measurement_of(&Model::open(model)?, measurement)
+}
+
 fn open_packed(options: &Options, context: &Context<'_>) -> Result<Subject> {
     let name = options.model.display();
     if options.by == Some(By::Clusters) {

@@ -297,7 +297,7 @@ fn of_model(about: &Modelled) -> Rows {
                     );
                     rows.push(row![format!("  pass {}", number + 1), found]);
                 }
-                for name in ["amount", "centre", "first", "sample", "restarts"] {
+                for name in ["amount", "centre", "representatives", "first", "sample", "restarts"] {
                     rows.extend(asked("cluster", name).map(|value| row![format!("  {name}"), value]));
                 }
                 rows.push(row!["  representatives", bytes_text(report.representative_bytes)]);

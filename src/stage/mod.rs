@@ -2,6 +2,7 @@
 
 pub mod about;
 pub mod appearance;
+pub mod baselines;
 pub mod cluster;
 pub mod compare;
 pub mod components;

@@ -11,6 +11,7 @@ use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::method::tile::Tile;
+use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::Context;
 use crate::run::recipe::Recipe;
@@ -22,7 +23,9 @@ use crate::store::model::components::{ComponentsRecipe, Found};
 use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage};
 pub use crate::store::packed::{ENDING, is_packed};
-use crate::store::packed::{LICENCE, MEASUREMENT, PackedFile, SAMPLES, TEXEL_MM, TRANSFER};
+use crate::store::packed::{
+    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
+};
 
 /// How small, or how good.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,7 +95,9 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
     // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
     context.require("packing components", 5 * model.components_bytes()?)?;
-    let whole = unpacked_model(&model, options)?;
+    let mut whole = unpacked_model(&model)?;
+    whole.texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
+    whole.texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
     if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
         return Err(Error::usage(format!(
             "{}: its components come from a packed file, so it is not known how far they are from the measurement",
@@ -120,8 +125,24 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     })
 }
 
+/// What the components of a model are after they were packed into at most so many bytes, and how many it took; none
+/// where that is too few for any file.
+pub(crate) fn packed_and_unpacked(
+    model: &Model,
+    bytes: u64,
+    context: &Context<'_>,
+) -> Result<Option<(Components, u64)>> {
+    let whole = unpacked_model(model)?;
+    let target = packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX));
+    let Ok(file) = context.compute(|| packed::pack(&whole, None, target)) else { return Ok(None) };
+    let length = file.bytes.len() as u64;
+    let file = PackedFile::of(model.path(), file.bytes)?;
+    let unpacked = file.model(context)?;
+    Ok(Some((OpenedFile::of(file, unpacked).components, length)))
+}
+
 /// The components of a model as the packer takes them.
-fn unpacked_model(model: &Model, options: &Options) -> Result<packed::Model> {
+fn unpacked_model(model: &Model) -> Result<packed::Model> {
     let components = model.components()?;
     let tile: TileReport = model.tile_report()?;
     let count = components.count();
@@ -144,8 +165,6 @@ fn unpacked_model(model: &Model, options: &Options) -> Result<packed::Model> {
         // Of a tile that is the whole measurement it can be told again which texel is which.
         texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
     }
-    texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
-    texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
     Ok(packed::Model {
         size: tile.size,
         wraps: tile.wraps,

@@ -232,3 +232,51 @@ fn a_packed_model_is_exported_and_imported_as_the_samples_that_it_stands_for() {
         );
     }
 }
+
+#[test]
+fn baselines_are_compared_at_the_same_bytes() {
+    let folder = material();
+    let at = |name: &str| folder.path().join(name);
+    let compare = |options: &[&str]| {
+        let mut run = btf();
+        run.arg("compare")
+            .args([&fixture().measurement(), &at("c.model.zarr")])
+            .arg("--baselines")
+            .args(options);
+        run
+    };
+    let report = json(compare(&["--curves"]).arg(at("curves.png")));
+    assert!(image::open(at("curves.png")).unwrap().width() >= 600);
+    let rows = report["rows"].as_array().unwrap();
+    let figure = |row: &Value, name: &str| row["figures"][name].as_f64().unwrap();
+    let of = |method: &str| -> Vec<&Value> { rows.iter().filter(|row| row["method"] == method).collect() };
+    // Clusters as they are have the figures of a plain comparison; means have the least squared error.
+    let plain = json(btf().arg("compare").args([&fixture().measurement(), &at("c.model.zarr")]));
+    let [texel, mean, median] =
+        ["texel", "mean", "median"].map(|rule| of(&format!("clusters, {rule}"))[0].clone());
+    assert!((figure(&texel, "psnr_db") - plain["all"]["psnr_db"].as_f64().unwrap()).abs() < 1e-9);
+    assert!((figure(&texel, "lightness") - plain["all"]["lightness"].as_f64().unwrap()).abs() < 1e-9);
+    assert!(figure(&mean, "psnr_db") > figure(&median, "psnr_db"), "{report}");
+    assert!(figure(&median, "psnr_db") > figure(&texel, "psnr_db"), "{report}");
+    // More bytes of a method are never worse, but for what 8 bits cost; packed files never exceed what they are beside.
+    for method in ["PCA", "PCA per view", "packed"] {
+        let rows = of(method);
+        assert!(rows.len() >= 3, "{method}: {report}");
+        for pair in rows.windows(2) {
+            assert!(pair[0]["bytes"].as_u64() < pair[1]["bytes"].as_u64(), "{method}");
+            assert!(figure(pair[0], "psnr_db") < figure(pair[1], "psnr_db") + 0.3, "{method}: {report}");
+        }
+    }
+    assert_eq!(of("polynomials").len(), 1);
+    for row in rows {
+        assert!((0.0..=1.0).contains(&figure(row, "ssim")) && figure(row, "sharpness") > 0.0, "{row}");
+    }
+    let told = succeed(&mut compare(&["--threads", "1"]));
+    assert!(told.contains("PCA per view") && told.contains("ahead"), "{told}");
+    assert_eq!(json(&mut compare(&["--threads", "1"])), json(&mut compare(&["--threads", "3"])));
+    let told = fail(
+        btf().arg("compare").args([&fixture().measurement(), &fixture().model()]).arg("--baselines"),
+        66,
+    );
+    assert!(told.contains("btf components"), "{told}");
+}

@@ -86,6 +86,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         model: options.model.clone(),
         amount: Amount::Clusters(1),
         centre: options.centre,
+        representatives: crate::method::cluster::choice::Representation::Texel,
         limits: options.limits,
         first: None,
         sample: None,
@@ -164,7 +165,7 @@ impl Curve {
             right: "clusters n_c".to_owned(),
             up: "mean |dL*| from centres".to_owned(),
             labels: "1:N  representatives and index are N times smaller than the raw measurement".to_owned(),
-            points: points.collect(),
+            lines: vec![points.collect()],
         }
     }
 }

@@ -10,9 +10,9 @@ use crate::section::{Found, Section};
 use crate::spectrum::Transforms;
 use crate::stream::{Stream, Truth};
 
-/// One section: a file that is cut behind it is a model.
+/// What is known of a section: a file that is cut behind it is a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct SectionEnd {
     /// Byte where it ends.
     pub end: usize,
     /// Components up to it.
@@ -40,9 +40,11 @@ pub struct Unpacked {
     /// The model.
     pub model: Model,
     /// The sections that it was made of.
-    pub planes: Vec<Plane>,
+    pub planes: Vec<SectionEnd>,
     /// Sections that the file was written with.
     pub sections: usize,
+    /// Bytes of the header, before the first of them.
+    pub header_bytes: usize,
     /// How it ends.
     pub ending: Ending,
 }
@@ -58,10 +60,11 @@ pub struct Unpacked {
 pub fn unpack(file: &[u8]) -> Result<Unpacked> {
     let mut reader = Reader::new(file);
     let header = Header::read(&mut reader, file)?;
+    let header_bytes = reader.at();
     let transforms = Transforms::new(header.size, &header.views, &header.lights, header.channels.len());
     let mut stream = Stream::new(header.size, transforms.degrees(), header.channels.len(), header.planes);
     let (brdf, texels) = (stream.brdf.values(), stream.image.values());
-    let (mut planes, mut strengths): (Vec<Plane>, Vec<u16>) = (vec![], vec![]);
+    let (mut planes, mut strengths): (Vec<SectionEnd>, Vec<u16>) = (vec![], vec![]);
     let mut ending = Ending::Whole;
     let mut step = f64::from(header.step);
     for low in (0..header.sections).rev() {
@@ -85,7 +88,7 @@ pub fn unpack(file: &[u8]) -> Result<Unpacked> {
         strengths.extend(section.strengths);
         step = f64::from(header.step) * f64::from(1u32 << low);
         let decibels = f64::from(section.centibels) / 100.0;
-        planes.push(Plane { end: reader.at(), components: section.components, decibels, step });
+        planes.push(SectionEnd { end: reader.at(), components: section.components, decibels, step });
     }
     if planes.is_empty() {
         let found = match ending {
@@ -113,5 +116,5 @@ pub fn unpack(file: &[u8]) -> Result<Unpacked> {
         channels: header.channels,
         texts: header.texts,
     };
-    Ok(Unpacked { model, planes, sections: header.sections as usize, ending })
+    Ok(Unpacked { model, planes, sections: header.sections as usize, header_bytes, ending })
 }

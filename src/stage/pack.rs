@@ -19,7 +19,7 @@ use crate::shape::Size;
 use crate::stage::compare::same_directions;
 use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
-use crate::store::model::components::{ComponentsRecipe, Found};
+use crate::store::model::components::{ComponentsRecipe, Found, raw_bytes};
 use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage};
 pub use crate::store::packed::{ENDING, is_packed};
@@ -201,8 +201,14 @@ pub struct About {
     pub channels: Vec<String>,
     /// Bytes of the file.
     pub bytes: usize,
+    /// Of these, bytes of the header: sizes, directions, names and texts.
+    pub header_bytes: usize,
+    /// Bytes of the same components as a model keeps them.
+    pub raw_bytes: u64,
     /// Bytes of the tile's samples, where their type is said.
     pub tile_bytes: Option<u64>,
+    /// Whether the tile is all of the measurement.
+    pub whole_measurement: bool,
     /// What it can be cut to.
     pub planes: Vec<Plane>,
     /// What else is said.
@@ -218,9 +224,10 @@ pub struct About {
 pub fn about(path: &Path) -> Result<About> {
     let file = PackedFile::read(path)?;
     let (notes, samples, bytes) = (file.notes(), file.sample_type(), file.bytes);
-    let packed::Unpacked { model, planes, .. } = file.unpacked;
+    let whole_measurement = file.text(MEASUREMENT).is_some();
+    let packed::Unpacked { model, planes, header_bytes, .. } = file.unpacked;
     let values = (model.texels() * model.brdf()) as u64;
-    let plane = |plane: &packed::Plane| Plane {
+    let plane = |plane: &packed::SectionEnd| Plane {
         bytes: plane.end,
         components: plane.components,
         psnr_db: plane.decibels,
@@ -231,6 +238,9 @@ pub fn about(path: &Path) -> Result<About> {
         wraps: model.wraps,
         directions: [model.views.len(), model.lights.len()],
         bytes,
+        header_bytes,
+        raw_bytes: raw_bytes(model.components.len(), model.brdf(), model.texels()),
+        whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
         channels: model.channels,

@@ -152,6 +152,8 @@ pub(crate) struct Packed {
     pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,
+    /// Bytes of the file.
+    pub(crate) file_bytes: u64,
     /// Memory that it took to open.
     pub(crate) memory_bytes: u64,
 }
@@ -174,7 +176,7 @@ impl Packed {
     pub(crate) fn of(file: PackedFile) -> Result<Self> {
         let (description, notes, memory_bytes) = (file.description()?, file.notes(), file.memory_bytes());
         let measurement = file.text(MEASUREMENT).map(str::to_owned);
-        let digest = file.digest;
+        let (digest, file_bytes) = (file.digest, file.bytes as u64);
         let from = file.unpacked.model;
         let list =
             |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
@@ -187,7 +189,17 @@ impl Packed {
             channels: from.channels,
         };
         let (wraps, texts) = (from.wraps, from.texts);
-        Ok(Self { components, description, wraps, digest, measurement, texts, notes, memory_bytes })
+        Ok(Self {
+            components,
+            description,
+            wraps,
+            digest,
+            measurement,
+            texts,
+            notes,
+            file_bytes,
+            memory_bytes,
+        })
     }
 }
 

@@ -142,6 +142,27 @@ fn a_packed_model_is_compared_like_the_model_that_it_unpacks_to() {
     succeed(btf().arg("unpack").args([&at("w.btfc"), &at("v.model.zarr")]));
     let (packed, unpacked) = (json(&mut compare(&at("w.btfc"))), json(&mut compare(&at("v.model.zarr"))));
     assert!((figure(&packed) - figure(&unpacked)).abs() < 0.02, "{packed} {unpacked}");
+    // Every byte is counted, and it is said of what it is a part.
+    let length = std::fs::metadata(at("w.btfc")).unwrap().len();
+    let about = json(btf().arg("info").arg(at("w.btfc")));
+    let ledger = &packed["ledger"];
+    assert_eq!(ledger["parts"][0]["coded_bytes"], length);
+    assert_eq!(ledger["parts"][0]["raw_bytes"], about["raw_bytes"]);
+    assert_eq!((&ledger["tile_bytes"], &about["bytes"]), (&about["tile_bytes"], &length.into()));
+    assert_eq!(ledger["tile_bytes"], ledger["measurement_bytes"]);
+    let told = succeed(&mut compare(&at("w.btfc")));
+    assert!(told.contains("size: packed file, ") && told.contains("of the measurement's raw"), "{told}");
+    let told = succeed(btf().arg("info").arg(at("w.btfc")));
+    assert!(told.contains("of the header") && told.contains("all of the measurement"), "{told}");
+    let of_clusters = json(compare(&at("c.model.zarr")).args(["--by", "clusters"]));
+    let names = |ledger: &Value| {
+        ledger["parts"].as_array().unwrap().iter().map(|part| part["name"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&of_clusters["ledger"]), ["index", "representatives"]);
+    assert!(
+        of_clusters["ledger"]["tile_bytes"].as_u64() < of_clusters["ledger"]["measurement_bytes"].as_u64()
+    );
+    assert_eq!(names(&unpacked["ledger"]), ["components"]);
     let swapped = json(btf().arg("compare").args([&at("w.btfc"), &measurement]));
     assert_eq!(swapped, packed);
     for shard in ["1/2", "0/2"] {

@@ -8,6 +8,7 @@ use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
 use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::compare::{By, Subject};
+use btfkit::stage::ledger::Ledger;
 use btfkit::stage::partial::Sharing;
 use btfkit::stage::{baselines, compare, image, pack};
 use btfkit::store::model::Model;
@@ -123,7 +124,10 @@ impl Compare {
             }
         };
         if self.json {
-            let value = as_json(&report)?;
+            let mut value = as_json(&report)?;
+            if let Some(members) = value.as_object_mut() {
+                members.insert("ledger".to_owned(), as_json(&subject.ledger)?);
+            }
             console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
@@ -142,6 +146,7 @@ impl Compare {
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
+            console.line(ledger_text(&subject.ledger));
             if by == By::Components {
                 console.line(match pack::is_packed(model) {
                     true => "by the components of the packed model",
@@ -240,6 +245,24 @@ impl Compare {
             .map(|picture| picture.magnified(factor));
         Ok(captioned(&["measured", "model", "difference x 4"], &shown))
     }
+}
+
+/// What the values of a tile take, and of what that is a part.
+fn ledger_text(ledger: &Ledger) -> String {
+    let names: Vec<&str> = ledger.parts.iter().map(|part| part.name).collect();
+    let (raw, coded) = (ledger.raw_bytes(), ledger.coded_bytes());
+    let ratios =
+        |of: u64| [raw, coded].map(|bytes| ratio_text(of as f64 / bytes.max(1) as f64)).join(" and ");
+    format!(
+        "size: {}, {} as plain numbers and {} as stored; {} of the tile's raw {}, {} of the measurement's raw {}",
+        names.join(" + "),
+        bytes_text(raw),
+        bytes_text(coded),
+        ratios(ledger.tile_bytes),
+        bytes_text(ledger.tile_bytes),
+        ratios(ledger.measurement_bytes),
+        bytes_text(ledger.measurement_bytes)
+    )
 }
 
 /// Pictures of one size side by side, each under its caption.

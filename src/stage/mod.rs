@@ -15,6 +15,7 @@ pub mod image;
 pub mod import;
 pub mod judge;
 pub(crate) mod kept;
+pub mod ledger;
 pub mod loss;
 pub mod normals;
 pub mod pack;

@@ -19,7 +19,7 @@ use crate::shape::Size;
 use crate::stage::compare::same_directions;
 use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
-use crate::store::model::components::{ComponentsRecipe, Found};
+use crate::store::model::components::{ComponentsRecipe, Found, raw_bytes};
 use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage};
 pub use crate::store::packed::{ENDING, is_packed};
@@ -203,8 +203,14 @@ pub struct About {
     pub channels: Vec<String>,
     /// Bytes of the file.
     pub bytes: usize,
+    /// Of these, bytes of the header: sizes, directions, names and texts.
+    pub header_bytes: usize,
+    /// Bytes of the same components as a model keeps them.
+    pub raw_bytes: u64,
     /// Bytes of the tile's samples, where their type is said.
     pub tile_bytes: Option<u64>,
+    /// Whether the tile is all of the measurement.
+    pub whole_measurement: bool,
     /// What it can be cut to.
     pub planes: Vec<Plane>,
     /// What else is said.
@@ -220,10 +226,13 @@ pub struct About {
 pub fn about(path: &Path) -> Result<About> {
     let file = PackedFile::open(path)?;
     let (notes, samples) = (file.notes(), file.sample_type());
-    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, .. } = file.outline;
-    let brdf = views.len() * lights.len() * channels.len();
-    let values = (size[0] * size[1] * brdf) as u64;
-    let plane = |plane: &packed::Plane| Plane {
+    let whole_measurement = file.text(MEASUREMENT).is_some();
+    let components = file.outline.components();
+    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, header_bytes, .. } =
+        file.outline;
+    let (brdf, texels) = (views.len() * lights.len() * channels.len(), size[0] * size[1]);
+    let values = (texels * brdf) as u64;
+    let plane = |plane: &packed::SectionEnd| Plane {
         bytes: plane.end,
         components: plane.components,
         psnr_db: plane.decibels,
@@ -234,6 +243,9 @@ pub fn about(path: &Path) -> Result<About> {
         wraps,
         directions: [views.len(), lights.len()],
         bytes,
+        header_bytes,
+        raw_bytes: raw_bytes(components, brdf, texels),
+        whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
         channels,

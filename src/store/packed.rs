@@ -172,6 +172,8 @@ pub(crate) struct Packed {
     pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,
+    /// Bytes of the file.
+    pub(crate) file_bytes: u64,
     /// Memory that it took to open.
     pub(crate) memory_bytes: u64,
 }
@@ -191,6 +193,7 @@ impl Packed {
     pub(crate) fn of(file: PackedFile, from: packed::Model) -> Self {
         let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
         let measurement = file.text(MEASUREMENT).map(str::to_owned);
+        let file_bytes = file.outline.bytes as u64;
         let (description, digest) = (file.description, file.digest);
         let list =
             |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
@@ -203,7 +206,7 @@ impl Packed {
             channels: from.channels,
         };
         let (wraps, texts) = (from.wraps, from.texts);
-        Self { components, description, wraps, digest, measurement, texts, notes, memory_bytes }
+        Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
     }
 }
 

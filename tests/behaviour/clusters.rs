@@ -317,7 +317,7 @@ fn means_and_medians_stand_for_clusters_whatever_the_samples_threads_and_steps()
         let store = at(&format!("{samples}.zarr"));
         succeed(btf().arg("import").args([&fixture().archive(), &store]).args(["--samples", samples]));
         let model = |rule: &str, options: &[&str]| {
-            let model = at(&format!("{samples}-{rule}{}.model.zarr", options.len()));
+            let model = at(&format!("{samples}-{rule}{}.model.zarr", options.concat()));
             succeed(btf().arg("tile").args([&store, &model]));
             let rule = ["--clusters", "20", "--representatives", rule];
             succeed(btf().arg("cluster").args([&store, &model]).args(rule).args(options));
@@ -330,7 +330,7 @@ fn means_and_medians_stand_for_clusters_whatever_the_samples_threads_and_steps()
         assert!(median[0] < mean[0] && mean[0] < texel[0], "{texel:?} {mean:?} {median:?}");
         // A mean is that of the stored samples of the cluster's texels.
         let mean = model("mean", &["--threads", "3"]);
-        assert_same(&at(&format!("{samples}-mean0.model.zarr")), &mean);
+        assert_same(&at(&format!("{samples}-mean.model.zarr")), &mean);
         let passes = ["--sample", "300"];
         let whole = model("mean", &passes);
         let steps = at("steps.model.zarr");
@@ -353,7 +353,7 @@ fn means_and_medians_stand_for_clusters_whatever_the_samples_threads_and_steps()
         assert!(succeed(btf().arg("info").arg(&whole)).contains("representatives"));
     }
     let told = fail(
-        btf().arg("cluster").args([&at("u8.zarr"), &at("u8-mean0.model.zarr")]).args([
+        btf().arg("cluster").args([&at("u8.zarr"), &at("u8-mean.model.zarr")]).args([
             "--clusters-of",
             "x",
             "--representatives",

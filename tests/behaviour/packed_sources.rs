@@ -126,7 +126,8 @@ fn a_packed_model_is_compared_like_the_model_that_it_unpacks_to() {
     let packed = json(compare(&at("c.btfc")).args(of_cut).current_dir(folder.path()));
     let components = json(compare(&at("c.model.zarr")).args(["--by", "components"]));
     let figure = |report: &Value| report["all"]["psnr_db"].as_f64().unwrap();
-    let said = json(btf().arg("info").arg(at("c.btfc")))["planes"][5]["psnr_db"].as_f64().unwrap();
+    let about = json(btf().arg("info").arg(at("c.btfc")));
+    let said = about["planes"].as_array().unwrap().last().unwrap()["psnr_db"].as_f64().unwrap();
     let (found, whole) = (figure(&packed), figure(&components));
     assert!((said - 0.1..said + 0.4).contains(&found) && found < whole, "{said} {found} {whole}");
     let told =
@@ -142,6 +143,27 @@ fn a_packed_model_is_compared_like_the_model_that_it_unpacks_to() {
     succeed(btf().arg("unpack").args([&at("w.btfc"), &at("v.model.zarr")]));
     let (packed, unpacked) = (json(&mut compare(&at("w.btfc"))), json(&mut compare(&at("v.model.zarr"))));
     assert!((figure(&packed) - figure(&unpacked)).abs() < 0.02, "{packed} {unpacked}");
+    // Every byte is counted, and it is said of what it is a part.
+    let length = std::fs::metadata(at("w.btfc")).unwrap().len();
+    let about = json(btf().arg("info").arg(at("w.btfc")));
+    let ledger = &packed["ledger"];
+    assert_eq!(ledger["parts"][0]["coded_bytes"], length);
+    assert_eq!(ledger["parts"][0]["raw_bytes"], about["raw_bytes"]);
+    assert_eq!((&ledger["tile_bytes"], &about["bytes"]), (&about["tile_bytes"], &length.into()));
+    assert_eq!(ledger["tile_bytes"], ledger["measurement_bytes"]);
+    let told = succeed(&mut compare(&at("w.btfc")));
+    assert!(told.contains("size: packed file, ") && told.contains("of the measurement's raw"), "{told}");
+    let told = succeed(btf().arg("info").arg(at("w.btfc")));
+    assert!(told.contains("of the header") && told.contains("all of the measurement"), "{told}");
+    let of_clusters = json(compare(&at("c.model.zarr")).args(["--by", "clusters"]));
+    let names = |ledger: &Value| {
+        ledger["parts"].as_array().unwrap().iter().map(|part| part["name"].clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(names(&of_clusters["ledger"]), ["index", "representatives"]);
+    assert!(
+        of_clusters["ledger"]["tile_bytes"].as_u64() < of_clusters["ledger"]["measurement_bytes"].as_u64()
+    );
+    assert_eq!(names(&unpacked["ledger"]), ["components"]);
     let swapped = json(btf().arg("compare").args([&at("w.btfc"), &measurement]));
     assert_eq!(swapped, packed);
     for shard in ["1/2", "0/2"] {
@@ -224,8 +246,8 @@ fn a_packed_model_is_exported_and_imported_as_the_samples_that_it_stands_for() {
         assert!(told.contains("the file was cut"), "{command}: {told}");
     }
     std::fs::write(at("none.btfc"), &bytes[..40]).unwrap();
-    for command in ["export", "import"] {
-        let told = fail(btf().arg(command).args([&at("none.btfc"), &at("none.zip")]), 65);
+    for (command, out) in [("export", "none.npy"), ("import", "none.zarr")] {
+        let told = fail(btf().arg(command).args([&at("none.btfc"), &at(out)]), 65);
         assert!(
             told.contains("none.btfc: ") && told.contains("found the end of the file"),
             "{command}: {told}"

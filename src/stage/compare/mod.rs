@@ -15,6 +15,7 @@ use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
+use crate::stage::ledger::Ledger;
 use crate::stage::partial::{Partial, Sharing};
 pub use crate::stage::values::By;
 use crate::stage::values::{TileSamples, TileValues};
@@ -227,6 +228,8 @@ pub struct Subject {
     pub tile: Tile,
     /// The values of the tile.
     pub values: TileValues,
+    /// What they take.
+    pub ledger: Ledger,
     /// What the values depend on, for sums that are shared.
     digest: String,
 }
@@ -250,8 +253,9 @@ pub fn open(options: &Options, context: &Context<'_>) -> Result<Subject> {
     let measurement = open_measurement_of(&model, &options.measurement)?;
     let by = options.by.map_or_else(|| By::of(&model), Ok)?;
     let digest = model.digest_of(&[Stage::Tile, by.stage()])?;
-    let values = TileValues::of_model(&model, by, context)?;
-    Ok(Subject { tile: model.tile()?, measurement, values, digest })
+    let (values, tile) = (TileValues::of_model(&model, by, context)?, model.tile()?);
+    let ledger = Ledger::of_model(&model, by, measurement.description(), tile.size.texels())?;
+    Ok(Subject { measurement, tile, values, ledger, digest })
 }
 
 /// Opens the measurement of a model.
@@ -295,7 +299,9 @@ fn open_packed(options: &Options, context: &Context<'_>) -> Result<Subject> {
         .hint("name what the packed model was made of"));
     }
     let digest = packed.digest.clone();
-    Ok(Subject { measurement, tile, values: TileValues::of_opened(packed)?, digest })
+    let components = packed.components.count();
+    let ledger = Ledger::of_packed(packed.file_bytes, components, measured, tile.size.texels());
+    Ok(Subject { tile, values: TileValues::of_opened(packed)?, ledger, digest, measurement })
 }
 
 /// Checks that the tile of a packed model is all of a measurement.

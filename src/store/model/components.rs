@@ -87,8 +87,7 @@ impl Shape {
     }
 
     fn bytes(&self) -> u64 {
-        let brdf = self.brdf() as u64;
-        4 * brdf + self.components as u64 * (2 * (brdf + self.size.texels() as u64) + 8)
+        raw_bytes(self.components, self.brdf(), self.size.texels())
     }
 
     fn mean(&self) -> Layout<'static> {
@@ -109,6 +108,11 @@ impl Shape {
     fn scale(&self) -> Layout<'static> {
         Layout::small::<f32>(&["component"], &[self.components])
     }
+}
+
+/// Bytes of components as a model keeps them: a mean of f32, the rest of i16 with two scales each.
+pub(crate) fn raw_bytes(components: usize, brdf: usize, texels: usize) -> u64 {
+    (4 * brdf + components * (2 * (brdf + texels) + 8)) as u64
 }
 
 const UNITS: &str = "sRGB curve, 255 = reflectance 1";

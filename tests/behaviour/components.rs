@@ -209,8 +209,8 @@ fn a_packed_file_is_told_of_cut_and_never_trusted() {
 
 /// A measurement of floats by the fixture's archive, some of whose samples are changed, and a model with its tile.
 fn of_floats(folder: &Path, transfer: &str, change: impl Fn(&mut [[u8; 4]])) -> [PathBuf; 2] {
-    let at = |name: &str| folder.join(format!("{name}-{transfer}"));
-    let [floats, store, model] = [at("f.zarr"), at("m.zarr"), at("m.model.zarr")];
+    let at = |name: &str| folder.join(format!("{name}-{transfer}.zarr"));
+    let [floats, store, model] = [at("f"), at("m"), at("model")];
     let npy = folder.join(format!("f-{transfer}.npy"));
     let reading = ["--samples", "f32", "--transfer", transfer];
     succeed(btf().arg("import").args([&fixture().archive(), &floats]).args(reading));

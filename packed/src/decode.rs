@@ -4,6 +4,7 @@ use crate::bytes::Reader;
 use crate::error::{Error, Result};
 use crate::header::{Header, expect_numbers};
 use crate::model::{Component, Model};
+use crate::palette::Palette;
 use crate::quantise::strength;
 use crate::range_coder::Decoder;
 use crate::section::{Found, Section};
@@ -43,8 +44,10 @@ pub struct Unpacked {
     pub planes: Vec<SectionEnd>,
     /// Sections that the file was written with.
     pub sections: usize,
-    /// Bytes of the header, before the first of them.
+    /// Bytes before the first of them: the header, and the palette.
     pub header_bytes: usize,
+    /// Centres of the palette, where images are by one.
+    pub centres: Option<usize>,
     /// How it ends.
     pub ending: Ending,
 }
@@ -60,10 +63,16 @@ pub struct Unpacked {
 pub fn unpack(file: &[u8]) -> Result<Unpacked> {
     let mut reader = Reader::new(file);
     let header = Header::read(&mut reader, file)?;
+    let palette = match header.has_palette {
+        true => Some(Palette::read(&mut reader, file, header.size)?),
+        false => None,
+    };
     let header_bytes = reader.at();
-    let transforms = Transforms::new(header.size, &header.views, &header.lights, header.channels.len());
-    let mut stream = Stream::new(header.size, transforms.degrees(), header.channels.len(), header.planes);
-    let (brdf, texels) = (stream.brdf.values(), stream.image.values());
+    let centres = palette.as_ref().map(Palette::centres);
+    let channels = header.channels.len();
+    let transforms = Transforms::new(header.size, &header.views, &header.lights, channels, palette);
+    let mut stream = Stream::new(&transforms, channels, header.planes);
+    let (brdf, texels) = (stream.brdf.values(), header.size[0] * header.size[1]);
     let (mut planes, mut strengths): (Vec<SectionEnd>, Vec<u16>) = (vec![], vec![]);
     let mut ending = Ending::Whole;
     let mut step = f64::from(header.step);
@@ -116,5 +125,5 @@ pub fn unpack(file: &[u8]) -> Result<Unpacked> {
         channels: header.channels,
         texts: header.texts,
     };
-    Ok(Unpacked { model, planes, sections: header.sections as usize, header_bytes, ending })
+    Ok(Unpacked { model, planes, sections: header.sections as usize, header_bytes, centres, ending })
 }

@@ -201,8 +201,10 @@ pub struct About {
     pub channels: Vec<String>,
     /// Bytes of the file.
     pub bytes: usize,
-    /// Of these, bytes of the header: sizes, directions, names and texts.
+    /// Of these, bytes of the header (sizes, directions, names and texts) and of the palette.
     pub header_bytes: usize,
+    /// Centres of the palette, where coefficients are by one.
+    pub centres: Option<usize>,
     /// Bytes of the same components as a model keeps them.
     pub raw_bytes: u64,
     /// Bytes of the tile's samples, where their type is said.
@@ -225,7 +227,7 @@ pub fn about(path: &Path) -> Result<About> {
     let file = PackedFile::read(path)?;
     let (notes, samples, bytes) = (file.notes(), file.sample_type(), file.bytes);
     let whole_measurement = file.text(MEASUREMENT).is_some();
-    let packed::Unpacked { model, planes, header_bytes, .. } = file.unpacked;
+    let packed::Unpacked { model, planes, header_bytes, centres, .. } = file.unpacked;
     let values = (model.texels() * model.brdf()) as u64;
     let plane = |plane: &packed::SectionEnd| Plane {
         bytes: plane.end,
@@ -239,6 +241,7 @@ pub fn about(path: &Path) -> Result<About> {
         directions: [model.views.len(), model.lights.len()],
         bytes,
         header_bytes,
+        centres,
         raw_bytes: raw_bytes(model.components.len(), model.brdf(), model.texels()),
         whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),

@@ -175,9 +175,9 @@ fn unpacked_model(model: &Model) -> Result<packed::Model> {
     })
 }
 
-/// A plane of a packed model, for people.
+/// What is known of a section of a packed model: a file that is cut behind it is a model, too.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Plane {
+pub struct Section {
     /// Bytes up to its end: a file that is cut there is a model.
     pub bytes: usize,
     /// Components.
@@ -212,7 +212,7 @@ pub struct About {
     /// Whether the tile is all of the measurement.
     pub whole_measurement: bool,
     /// What it can be cut to.
-    pub planes: Vec<Plane>,
+    pub planes: Vec<Section>,
     /// What else is said.
     pub texts: Vec<(String, String)>,
     /// What is wrong with its end.
@@ -229,7 +229,7 @@ pub fn about(path: &Path) -> Result<About> {
     let whole_measurement = file.text(MEASUREMENT).is_some();
     let packed::Unpacked { model, planes, header_bytes, centres, .. } = file.unpacked;
     let values = (model.texels() * model.brdf()) as u64;
-    let plane = |plane: &packed::SectionEnd| Plane {
+    let plane = |plane: &packed::SectionEnd| Section {
         bytes: plane.end,
         components: plane.components,
         psnr_db: plane.decibels,

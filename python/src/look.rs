@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use btfkit::render::texture::Reader;
+use btfkit::run::budget::Room;
 use btfkit::shape::Size;
 use btfkit::stage::image::{Options, PlaneOptions, Scene, Subject, Values};
 use btfkit::stage::render::material::{self, Material};
@@ -102,7 +103,8 @@ impl Look {
                 options.model.clone_from(&self.model);
                 options.plane = self.plane;
                 // Of two threads that open it at once, one's is kept.
-                let _ = self.material.set(material::open(&options, 0, context)?);
+                let _ =
+                    self.material.set(material::open(&options, &mut Room::new(context.memory()), context)?);
             }
             let material = self.material.get().ok_or_else(|| Error::internal("no material"))?;
             let mut values = vec![[0.0f32; 3]; count];

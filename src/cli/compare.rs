@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
@@ -6,31 +6,34 @@ use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
-use btfkit::stage::compare::By;
+use btfkit::stage::cluster::curve::ratio_text;
+use btfkit::stage::compare::{By, Subject};
+use btfkit::stage::ledger::Ledger;
 use btfkit::stage::partial::Sharing;
-use btfkit::stage::{compare, image};
-use btfkit::store;
-use btfkit::store::measurement::Measurement;
-use btfkit::store::model::{self, Model};
+use btfkit::stage::{baselines, compare, image, pack};
+use btfkit::store::model::Model;
+use btfkit::store::{self, model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::table::{row, table};
-use super::{Console, as_json};
+use super::{Console, as_json, bytes_text};
 
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0
+  btf compare wood.zarr wood.btfc --tile-of wood.model.zarr            a packed model
+  btf compare wood.zarr wood.model.zarr --baselines --curves curves.png
 Share the work between processes; the figures are those of one:
   btf compare wood.zarr wood.model.zarr --partial sums --shard 0/8     ... 7/8, in any order
   btf compare wood.zarr wood.model.zarr --partial sums --reduce        exit code 66 if a part is missing")]
 pub(super) struct Compare {
     /// The measurement
     measurement: PathBuf,
-    /// The model; the two may also come the other way round
+    /// The model, or a packed model; the two may also come the other way round
     model: PathBuf,
     /// Also write a picture of the measured tile, the model's tile, and four times their difference: .png, .jpg, .webp
     /// or .tif
@@ -45,6 +48,16 @@ pub(super) struct Compare {
     /// What of the model is compared [default: clusters, if it has them]
     #[arg(long, value_enum)]
     by: Option<ByName>,
+    /// Of a packed model whose tile was cut: the model that it was packed from, which says where the tile lies
+    #[arg(long, value_name = "MODEL")]
+    tile_of: Option<PathBuf>,
+    /// Compare other ways to keep the tile, at their bytes and at those of packed files: clusters with means and medians,
+    /// PCA of all and of each view, polynomial texture maps. The model needs components (btf components). Takes minutes
+    #[arg(long, conflicts_with_all = ["picture", "by", "tile_of", "partial"])]
+    baselines: bool,
+    /// With --baselines, also draw the curves of error and bytes: .png, .jpg, .webp or .tif
+    #[arg(long, value_name = "FILE", requires = "baselines")]
+    curves: Option<PathBuf>,
     /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
     #[arg(long, value_name = "DIR")]
     partial: Option<PathBuf>,
@@ -74,24 +87,34 @@ impl Compare {
     }
 
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
-        self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
+        let pictures = self.picture.iter().chain(&self.curves);
+        pictures.map(|path| Ending::of(path, &Ending::DISPLAY)).collect::<Result<Vec<_>>>()?;
         // Both are read, so what they are tells which is which.
         let named = [&self.measurement, &self.model];
-        let swapped = store::kind_of(named[0]).is_ok_and(|kind| kind == model::KIND);
-        let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
-        let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
-        let (model, measurement) = compare::open(&options)?;
-        let by = match self.by {
-            Some(ByName::Clusters) => By::Clusters,
-            Some(ByName::Components) => By::Components,
-            None => By::of(&model)?,
+        let is_model =
+            |path: &Path| pack::is_packed(path) || store::kind_of(path).is_ok_and(|kind| kind == model::KIND);
+        let [measurement, model] = if is_model(named[0]) { [named[1], named[0]] } else { named };
+        let options = compare::Options {
+            model: model.clone(),
+            measurement: measurement.clone(),
+            by: self.by.map(|by| match by {
+                ByName::Clusters => By::Clusters,
+                ByName::Components => By::Components,
+            }),
+            tile_of: self.tile_of.clone(),
         };
+        if self.baselines {
+            return self.run_baselines(measurement, model, context, console);
+        }
+        let subject = compare::open(&options, context)?;
+        let by = subject.values.by();
+        console.notes(subject.values.notes());
         let report = match &self.partial {
-            None => compare::run(&model, &measurement, by, context)?,
+            None => compare::run(&subject, context)?,
             Some(folder) => {
                 let shard = (!self.reduce).then_some(self.shard);
                 let sharing = Sharing { folder: folder.clone(), shard };
-                let shared = compare::run_shared(&model, &measurement, by, &sharing, context)?;
+                let shared = compare::run_shared(&subject, &sharing, context)?;
                 let Some(report) = shared.report else {
                     let views = counted(shared.views, "view");
                     console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
@@ -101,7 +124,10 @@ impl Compare {
             }
         };
         if self.json {
-            let value = as_json(&report)?;
+            let mut value = as_json(&report)?;
+            if let Some(members) = value.as_object_mut() {
+                members.insert("ledger".to_owned(), as_json(&subject.ledger)?);
+            }
             console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
@@ -120,16 +146,20 @@ impl Compare {
                 "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
                 counted(report.colour_texels, "texel")
             ));
+            console.line(ledger_text(&subject.ledger));
             if by == By::Components {
-                console.line("by the components of the model");
+                console.line(match pack::is_packed(model) {
+                    true => "by the components of the packed model",
+                    false => "by the components of the model",
+                });
             } else if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
                     report.all.ciede2000,
                     report.all.lightness,
-                    measurement.path().display(),
-                    model.path().display()
+                    measurement.display(),
+                    model.display()
                 ));
             }
             if report.all.samples_left_out > 0 {
@@ -137,42 +167,102 @@ impl Compare {
                 console.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
-        match &self.picture {
-            Some(path) => {
-                self.side_by_side(&model, &measurement, by, context)?.write(path, context.existing)?;
-                if !self.json {
-                    let description = measurement.description();
-                    let measured = [&description.views[..], &description.lights];
-                    console.notes(&image::notes_of_directions(measured, self.view, self.light));
-                }
-                Ok(())
-            }
-            None => Ok(()),
+        let Some(path) = &self.picture else { return Ok(()) };
+        self.side_by_side(&subject, context)?.write(path, context.existing)?;
+        if !self.json {
+            let measured = subject.values.directions();
+            console.notes(&image::notes_of_directions(measured, self.view, self.light));
         }
+        Ok(())
     }
 
-    fn side_by_side(
+    fn run_baselines(
         &self,
-        model: &Model,
-        measurement: &Measurement,
-        by: By,
+        measurement: &Path,
+        model: &Path,
         context: &Context<'_>,
-    ) -> Result<Picture> {
-        let tile = model.tile()?;
-        let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
-        let modelled = match by {
-            By::Clusters => {
-                let colors = image::cluster_colors(model, self.view, self.light)?;
-                image::look_up(tile.size, &model.index()?, &colors)?
-            }
-            By::Components => image::of_components(model, self.view, self.light, context)?,
-        };
+        console: Console,
+    ) -> Result<()> {
+        let report =
+            baselines::run(&Model::open(model)?, &compare::open_measurement(model, measurement)?, context)?;
+        if let Some(path) = &self.curves {
+            report.chart(&model.display().to_string()).draw().write(path, context.existing)?;
+        }
+        if self.json {
+            return console.plan(&as_json(&report)?);
+        }
+        let mut rows = vec![row![
+            "method",
+            "setting",
+            "bytes",
+            "of the tile",
+            "mean |dL*|",
+            "PSNR dB",
+            "CIEDE2000",
+            "SSIM",
+            "sharpness"
+        ]];
+        for found in &report.rows {
+            let figures = &found.figures;
+            rows.push(row![
+                found.method,
+                found.setting,
+                found.bytes,
+                ratio_text(report.tile_bytes as f64 / found.bytes as f64),
+                format!("{:.3}", figures.lightness),
+                figures.psnr_db.map_or("equal".to_owned(), |psnr| format!("{psnr:.2}")),
+                format!("{:.3}", figures.ciede2000),
+                format!("{:.4}", figures.ssim),
+                format!("{:.3}", figures.sharpness)
+            ]);
+        }
+        console.text(&table(&rows));
+        console.line(format!(
+            "of the tile: the {} of its raw samples; bytes count all but the directions, which all need",
+            bytes_text(report.tile_bytes)
+        ));
+        let ahead = report.ahead();
+        if ahead.is_empty() {
+            console.line("packed files are ahead by PSNR at all of these bytes");
+        }
+        for row in ahead {
+            console.line(format!(
+                "{} {} is ahead of packed files by PSNR at its bytes",
+                row.method, row.setting
+            ));
+        }
+        console.notes(&report.notes);
+        Ok(())
+    }
+
+    fn side_by_side(&self, subject: &Subject, context: &Context<'_>) -> Result<Picture> {
+        let Subject { measurement, tile, values, .. } = subject;
+        let measured = image::of_measured_tile(measurement, tile, self.view, self.light, context)?;
+        let modelled = values.picture(self.view, self.light, context)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]
             .map(|picture| picture.magnified(factor));
         Ok(captioned(&["measured", "model", "difference x 4"], &shown))
     }
+}
+
+/// What the values of a tile take, and of what that is a part.
+fn ledger_text(ledger: &Ledger) -> String {
+    let names: Vec<&str> = ledger.parts.iter().map(|part| part.name).collect();
+    let (raw, coded) = (ledger.raw_bytes(), ledger.coded_bytes());
+    let ratios =
+        |of: u64| [raw, coded].map(|bytes| ratio_text(of as f64 / bytes.max(1) as f64)).join(" and ");
+    format!(
+        "size: {}, {} as plain numbers and {} as stored; {} of the tile's raw {}, {} of the measurement's raw {}",
+        names.join(" + "),
+        bytes_text(raw),
+        bytes_text(coded),
+        ratios(ledger.tile_bytes),
+        bytes_text(ledger.tile_bytes),
+        ratios(ledger.measurement_bytes),
+        bytes_text(ledger.measurement_bytes)
+    )
 }
 
 /// Pictures of one size side by side, each under its caption.

@@ -10,6 +10,7 @@
 //!
 //! Values lie on the sRGB curve, on which 255 is white; see [`crate::color::curve`].
 
+use btfkit_packed::{LARGEST, LARGEST_OF_BASIS};
 use serde::{Deserialize, Serialize};
 
 use super::{Model, Stage};
@@ -17,6 +18,7 @@ use crate::error::Result;
 use crate::method::value::components::Components;
 use crate::run::recipe::Recipe;
 use crate::shape::Size;
+use crate::words::counted;
 use crate::zarr::Layout;
 
 /// What components depend on.
@@ -47,12 +49,29 @@ pub struct ComponentsReport {
     pub strengths: Vec<f64>,
     /// Squared error of all values, on the curve; none of those that were unpacked.
     pub squared_error: Option<f64>,
+    /// Samples of the tile that are no finite numbers: they count as black, also in the error.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub not_finite: u64,
     /// Peak signal-to-noise ratio on the curve, dB, as far as it is known.
     pub psnr_db: Option<f64>,
     /// Bytes of the arrays.
     pub bytes: u64,
     /// Bytes of the tile's samples in the measurement.
     pub tile_bytes: u64,
+}
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
+impl ComponentsReport {
+    /// What a user should know of them, if there is anything.
+    pub fn note(&self) -> Option<String> {
+        let samples = counted(self.not_finite, "sample");
+        let is_told = self.not_finite > 0;
+        is_told
+            .then(|| format!("{samples} of the tile: no finite numbers, counted as black, also in the PSNR"))
+    }
 }
 
 /// Extents of the arrays.
@@ -69,8 +88,7 @@ impl Shape {
     }
 
     fn bytes(&self) -> u64 {
-        let brdf = self.brdf() as u64;
-        4 * brdf + self.components as u64 * (2 * (brdf + self.size.texels() as u64) + 8)
+        raw_bytes(self.components, self.brdf(), self.size.texels())
     }
 
     fn mean(&self) -> Layout<'static> {
@@ -91,6 +109,11 @@ impl Shape {
     fn scale(&self) -> Layout<'static> {
         Layout::small::<f32>(&["component"], &[self.components])
     }
+}
+
+/// Bytes of components as a model keeps them: a mean of f32, the rest of i16 with two scales each.
+pub(crate) fn raw_bytes(components: usize, brdf: usize, texels: usize) -> u64 {
+    (4 * brdf + components * (2 * (brdf + texels) + 8)) as u64
 }
 
 const UNITS: &str = "sRGB curve, 255 = reflectance 1";
@@ -169,6 +192,7 @@ impl Model {
             components,
             strengths: vec![],
             squared_error: None,
+            not_finite: 0,
             psnr_db: None,
             bytes: 0,
             tile_bytes: 0,
@@ -205,18 +229,22 @@ impl Model {
     /// The components.
     ///
     /// # Errors
-    /// Where they have not been found, or hold what is no number.
+    /// Where they have not been found, or hold what is no number, or one of no use.
     pub fn components(&self) -> Result<Components> {
         let shape = self.shape_of_components()?;
-        let numbers = |name: &str, layout: &Layout<'_>| -> Result<Vec<f32>> {
+        // Those of packed models: sums of products have to stay finite.
+        let numbers = |name: &str, layout: &Layout<'_>, most: f64| -> Result<Vec<f32>> {
             let list = self.read::<f32>(Stage::Components, name, layout)?;
-            match list.iter().find(|value| !value.is_finite()) {
+            match list.iter().find(|value| !(f64::from(value.abs()) <= most)) {
                 None => Ok(list),
-                Some(value) => Err(self.damaged(name, &format!("got {value}, expected finite numbers"))),
+                Some(value) => {
+                    let what = format!("got {value:e}, expected finite numbers of at most {most:e}");
+                    Err(self.damaged(name, &what))
+                }
             }
         };
-        let scaled = |name: &str, layout: &Layout<'_>, scale: &str| -> Result<Vec<f32>> {
-            let scales = numbers(scale, &shape.scale())?;
+        let scaled = |name: &str, layout: &Layout<'_>, scale: &str, most: f64| -> Result<Vec<f32>> {
+            let scales = numbers(scale, &shape.scale(), most / -f64::from(i16::MIN))?;
             let steps = self.read::<i16>(Stage::Components, name, layout)?;
             Ok(steps
                 .iter()
@@ -228,9 +256,9 @@ impl Model {
             size: shape.size,
             brdf: [shape.brdf[0], shape.brdf[1]],
             channels: self.values()?.0,
-            mean: numbers("mean", &shape.mean())?,
-            basis: scaled("basis", &shape.basis(), "basis_scale")?,
-            coefficients: scaled("coefficients", &shape.coefficients(), "coefficient_scale")?,
+            mean: numbers("mean", &shape.mean(), LARGEST)?,
+            basis: scaled("basis", &shape.basis(), "basis_scale", LARGEST_OF_BASIS)?,
+            coefficients: scaled("coefficients", &shape.coefficients(), "coefficient_scale", LARGEST)?,
         })
     }
 }

@@ -6,6 +6,7 @@
 mod angular;
 pub mod archive_views;
 pub mod azimuth;
+pub mod background;
 pub(crate) mod duplicates;
 pub mod exposure;
 pub mod finding;
@@ -62,7 +63,12 @@ pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Rep
 pub fn examine(statistics: &Statistics) -> Report {
     let saturation = samples::saturation(statistics);
     let contrast = samples::contrast(statistics, !saturation.findings.is_empty());
-    let mut checks = vec![samples::numbers(statistics), samples::black(statistics), contrast];
+    let mut checks = vec![
+        samples::numbers(statistics),
+        samples::black(statistics),
+        background::check(statistics),
+        contrast,
+    ];
     let put_off = |names: &[&'static str], reason: &str| -> Vec<Check> {
         names.iter().map(|name| Check::not_checked(name, format!("{reason}: repair that first"))).collect()
     };

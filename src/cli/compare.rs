@@ -42,7 +42,7 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// What of the model is compared [default: clusters, if it has them]
+    /// Which values of the model to compare [default: clusters, if it has them]
     #[arg(long, value_enum)]
     by: Option<ByName>,
     /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
@@ -117,7 +117,8 @@ impl Compare {
             }
             console.text(&table(&rows));
             console.line(format!(
-                "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
+                "CIEDE2000: its mean, and what 95 % stay below, over {}; the other figures are over all texels. All views \
+                 count alike here; btf model and btf info weight them by the cosine of theta",
                 counted(report.colour_texels, "texel")
             ));
             if by == By::Components {

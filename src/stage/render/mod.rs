@@ -19,6 +19,7 @@ use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
+use crate::store::{kind_of, model};
 use crate::vector::Vector;
 use crate::words::counted;
 
@@ -27,7 +28,7 @@ pub use sheets::compare;
 /// Texels along a length of 1, the radius of an object, at scale 1.
 pub(crate) const DENSITY: f64 = 256.0;
 
-/// Rays a pixel, unless their number is given.
+/// Rays per pixel, unless their number is given.
 const SAMPLES: u32 = 16;
 
 /// Memory of a pixel while its picture is made and written.
@@ -36,7 +37,7 @@ const PIXEL_BYTES: u64 = 32;
 /// What a material is shown on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Seen from afar along the normal, a pixel a texel at scale 1.
+    /// Seen from the front, without perspective: one pixel per texel at scale 1.
     Flat,
     /// A square of side 2.
     Plane,
@@ -72,7 +73,7 @@ pub struct EnvironmentOptions {
     pub path: PathBuf,
     /// Turned about the vertical axis by this, degrees.
     pub turn_deg: f64,
-    /// So many lights stand for it.
+    /// It is approximated by so many directional lights.
     pub lights: usize,
     /// Whether it is seen behind the object.
     pub seen: bool,
@@ -100,7 +101,7 @@ pub struct Options {
     pub shape: Shape,
     /// Size of the picture.
     pub size: Size,
-    /// Rays a pixel; as the shape needs where absent.
+    /// Rays per pixel; as the shape needs where absent.
     pub samples: Option<u32>,
     /// Lights far away.
     pub lights: Vec<Direction>,
@@ -222,9 +223,15 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     context.progress.end();
     if beyond {
         let (size, _) = material.bounds.unwrap_or((Size::new(0, 0), false));
+        let is_model = kind_of(&options.source).is_ok_and(|kind| kind == model::KIND);
+        let more = if is_model {
+            "choose a larger --scale, or --plane for a surface that never ends"
+        } else {
+            "choose a larger --scale, or make a larger enlargement"
+        };
         report.notes.push(format!(
             "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; \
-             choose a larger --scale, a larger enlargement, or --plane"
+             {more}"
         ));
     }
     Ok(report)

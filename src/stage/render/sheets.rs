@@ -110,7 +110,7 @@ pub fn compare(
             .hint(notes.join("; ")));
     }
     let (top, left) = place(count, options.size);
-    canvas.text(top, left, "the tile, a pixel a texel");
+    canvas.text(top, left, "the tile, one pixel per texel");
     let tile = exposed(subject.flat_tile()?, options.exposure);
     canvas.put(top + LINE, left, &tile.as_display());
     let made = super::write(&canvas.into_picture(), 1.0, output, encoding, context)?;

@@ -66,6 +66,8 @@ mod odd_archives;
 #[path = "behaviour/option_effects.rs"]
 #[allow(dead_code)] // the program's own tests read the rest
 mod option_effects;
+#[path = "behaviour/packed_sources.rs"]
+mod packed_sources;
 #[path = "behaviour/paper_bytes.rs"]
 mod paper_bytes;
 #[path = "behaviour/picture_formats.rs"]

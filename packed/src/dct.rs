@@ -4,6 +4,8 @@
 
 use core::f64::consts::PI;
 
+use crate::turn::transposed;
+
 /// The transform of lengths `height` and `width`.
 pub(crate) struct Dct {
     size: [usize; 2],
@@ -32,10 +34,6 @@ impl Dct {
         along(&self.axes[1], &mut turned, height);
         image.copy_from_slice(&transposed(&turned, width, height));
     }
-}
-
-fn transposed(image: &[f64], height: usize, width: usize) -> Vec<f64> {
-    (0..width).flat_map(|x| (0..height).map(move |y| image[y * width + x])).collect()
 }
 
 /// The transform of one length, of many columns at once.
@@ -139,10 +137,13 @@ impl Axis {
         let (even, odd) = spare.split_at(half * width);
         for place in 0..half {
             let scale = 0.5 / self.cosine(length, place, 1);
-            for column in 0..width {
-                let (a, b) = (even[place * width + column], odd[place * width + column] * scale);
-                rows[place * width + column] = a + b;
-                rows[(length - 1 - place) * width + column] = a - b;
+            let (front, back) = rows.split_at_mut(half * width);
+            let front = &mut front[place * width..][..width];
+            let back = &mut back[(half - 1 - place) * width..][..width];
+            let parts = even[place * width..][..width].iter().zip(&odd[place * width..][..width]);
+            for ((front, back), (a, b)) in front.iter_mut().zip(back).zip(parts) {
+                let b = b * scale;
+                (*front, *back) = (a + b, a - b);
             }
         }
     }
@@ -151,8 +152,12 @@ impl Axis {
 /// Each row becomes the sum of all rows, each times its weight there.
 fn weighted(rows: &mut [f64], spare: &mut [f64], width: usize, weight: impl Fn(usize, usize) -> f64) {
     spare.fill(0.0);
+    // Of a spectrum most rows are nothing but zeros, which add nothing.
+    let is_some = |row: &&[f64]| row.iter().any(|&value| value != 0.0);
+    let given: Vec<(usize, &[f64])> =
+        rows.chunks_exact(width).enumerate().filter(|(_, row)| is_some(row)).collect();
     for (at, to) in spare.chunks_exact_mut(width).enumerate() {
-        for (number, from) in rows.chunks_exact(width).enumerate() {
+        for &(number, from) in &given {
             let weight = weight(at, number);
             to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
         }

@@ -4,6 +4,7 @@
 //! plane, a number is either still 0 and may become 1, or has one more bit. Rows, and whole images, that are still 0
 //! say with one bit that they stay so.
 
+use crate::quantise::value;
 use crate::range_coder::{Coder, Probability};
 
 /// Zeros around a layer, so that every number has neighbours.
@@ -15,8 +16,8 @@ const AROUND: usize = 16;
 /// Classes of sums over what lies at its place in images before.
 const BEFORE: usize = 12;
 
-/// Classes of frequencies.
-const FREQUENCIES: usize = SIDE * SIDE;
+/// The largest magnitude that sums have room for.
+const MOST_NOW: u32 = 1 << 16;
 
 /// Classes of the frequencies of rows, and of columns.
 const SIDE: usize = 6;
@@ -30,18 +31,34 @@ pub(crate) enum Kind {
     Image,
 }
 
-/// Size of an image, and which frequencies its rows and columns have.
+/// Size of an image, and how high the frequencies of its rows and columns are.
 #[derive(Clone, Debug)]
 pub(crate) struct Shape {
-    pub(crate) kind: Kind,
-    pub(crate) layers: usize,
-    /// Frequency of each row.
-    pub(crate) rows: Vec<u16>,
-    /// Frequency of each column.
-    pub(crate) columns: Vec<u16>,
+    layers: usize,
+    /// Class of the frequency of each row.
+    rows: Vec<u8>,
+    /// Class of the frequency of each column.
+    columns: Vec<u8>,
+    /// Whether magnitudes may be larger than sums have room for.
+    has_large: bool,
 }
 
 impl Shape {
+    /// An image with these frequencies of its rows and columns: degrees of polynomials, or numbers of half waves; of
+    /// so many planes.
+    pub(crate) fn new(kind: Kind, layers: usize, rows: &[usize], columns: &[usize], planes: u32) -> Self {
+        let class = |&frequency: &usize| {
+            let class = match kind {
+                Kind::Brdf => frequency / 2,
+                Kind::Image => (frequency + 1).ilog2() as usize,
+            };
+            class.min(SIDE - 1) as u8
+        };
+        let [rows, columns] = [rows, columns].map(|list| list.iter().map(class).collect());
+        // The twofold of a magnitude is summed, too.
+        Self { layers, rows, columns, has_large: planes >= MOST_NOW.ilog2() }
+    }
+
     pub(crate) fn values(&self) -> usize {
         self.layers * self.rows.len() * self.columns.len()
     }
@@ -57,18 +74,6 @@ impl Shape {
     /// Where the first number of a row lies.
     fn row_start(&self, layer: usize, row: usize) -> usize {
         layer * self.layer() + (row + EDGE) * self.stride() + EDGE
-    }
-
-    /// The class of the frequency of a row and a column.
-    fn frequency(&self, row: usize, column: usize) -> usize {
-        let class = |frequency: u16| {
-            let class = match self.kind {
-                Kind::Brdf => usize::from(frequency) / 2,
-                Kind::Image => (frequency + 1).ilog2() as usize,
-            };
-            class.min(SIDE - 1)
-        };
-        SIDE * class(self.rows[row]) + class(self.columns[column])
     }
 }
 
@@ -92,23 +97,30 @@ impl Grid {
         }
     }
 
-    /// The numbers in their order: magnitude and whether they are negative.
-    pub(crate) fn numbers<'a>(&'a self, shape: &'a Shape) -> impl Iterator<Item = (u32, bool)> + 'a {
-        let starts =
-            (0..shape.layers).flat_map(move |layer| (0..shape.rows.len()).map(move |row| (layer, row)));
-        starts.flat_map(move |(layer, row)| {
-            let start = shape.row_start(layer, row);
-            (start..start + shape.columns.len()).map(|at| (self.magnitudes[at], self.negative[at]))
-        })
+    /// What the numbers stand for, in their order, in units of `step`.
+    pub(crate) fn values(&self, shape: &Shape, step: f64) -> Vec<f64> {
+        let columns = shape.columns.len();
+        let mut values = vec![0.0; shape.values()];
+        for (number, (to, &begun)) in values.chunks_exact_mut(columns).zip(&self.begun).enumerate() {
+            if begun {
+                let start = shape.row_start(number / shape.rows.len(), number % shape.rows.len());
+                let numbers = self.magnitudes[start..].iter().zip(&self.negative[start..]);
+                to.iter_mut()
+                    .zip(numbers)
+                    .for_each(|(to, (&magnitude, &negative))| *to = value(magnitude, negative, step));
+            }
+        }
+        values
     }
 }
 
 /// The probabilities of everything that is coded of images of a kind.
 #[derive(Clone)]
 pub(crate) struct Contexts {
-    /// Whether a number becomes 1: by what lies around it and in images before, and by both and its frequency.
-    by_sums: Vec<Probability>,
-    by_frequency: Vec<Probability>,
+    /// Whether a number of the first layer, or of another one, becomes 1: by what lies around it and in images before,
+    /// [around][before], and by its frequency and both, [row][column][both].
+    by_sums: [Vec<Probability>; 2],
+    by_frequency: [Vec<Probability>; 2],
     /// One more bit of a number, by the number and by what lies around it.
     more: [[Probability; 4]; 3],
     /// Whether a row begins, by its neighbours and by the image before.
@@ -120,8 +132,8 @@ pub(crate) struct Contexts {
 impl Contexts {
     pub(crate) fn new() -> Self {
         Self {
-            by_sums: vec![Probability::default(); AROUND * BEFORE * 2],
-            by_frequency: vec![Probability::default(); AROUND * FREQUENCIES * 2],
+            by_sums: [(); 2].map(|()| vec![Probability::default(); AROUND * BEFORE]),
+            by_frequency: [(); 2].map(|()| vec![Probability::default(); SIDE * SIDE * AROUND]),
             more: Default::default(),
             row: Default::default(),
             image: Default::default(),
@@ -129,16 +141,30 @@ impl Contexts {
     }
 }
 
-/// A class of a sum: each to 3, then two an octave.
+/// Sums from which on the class is the last of [`AROUND`].
+const LAST: usize = 192;
+
+/// The class of each sum up to [`LAST`]: each to 3, then two an octave.
+const CLASSES: [u8; LAST + 1] = {
+    let mut classes = [0; LAST + 1];
+    let mut sum = 0;
+    while sum <= LAST {
+        classes[sum] = match sum {
+            0..4 => sum as u8,
+            _ => {
+                let octave = sum.ilog2();
+                2 * octave as u8 + (sum >> (octave - 1) & 1) as u8
+            }
+        };
+        sum += 1;
+    }
+    classes
+};
+
+/// The class of a sum, of so many classes; at most [`AROUND`].
+#[inline]
 fn class(sum: u32, most: usize) -> usize {
-    let class = match sum {
-        0..4 => sum as usize,
-        _ => {
-            let octave = sum.ilog2();
-            2 * octave as usize + (sum >> (octave - 1) & 1) as usize
-        }
-    };
-    class.min(most - 1)
+    usize::from(CLASSES[(sum as usize).min(LAST)]).min(most - 1)
 }
 
 /// Images of the same shape that were coded before, the nearest first, to the plane `shift` planes below the one that is
@@ -206,31 +232,38 @@ pub(crate) fn code_plane(
                 }
             }
             let start = shape.row_start(layer, row);
-            sums.of_row(shape, grid, before, layer, start);
-            for column in 0..columns {
-                let at = start + column;
-                let own = sums.own[column] + 4 * now(grid.magnitudes[at - 1]) + now(grid.magnitudes[at - 2]);
-                let others = sums.others[column];
+            match shape.has_large {
+                true => sums.of_row::<true>(shape, grid, before, layer, start),
+                false => sums.of_row::<false>(shape, grid, before, layer, start),
+            }
+            let not_first = usize::from(layer > 0);
+            let by_sums = &mut contexts.by_sums[not_first];
+            let by_frequency =
+                &mut contexts.by_frequency[not_first][usize::from(shape.rows[row]) * SIDE * AROUND..];
+            let numbers = grid.magnitudes[start..][..columns].iter_mut().zip(&mut grid.negative[start..]);
+            let known = sums.own.iter().zip(&sums.others).zip(&shape.columns);
+            // What this row itself changes: the two numbers to the left.
+            let (mut left, mut left_2) = (0, 0);
+            for (column, ((magnitude, negative), ((own, &others), &frequency))) in
+                numbers.zip(known).enumerate()
+            {
+                let own = own + 4 * now::<true>(left) + now::<true>(left_2);
                 let number = first + column;
                 let bit = wanted.magnitude(number) & 1 == 1;
-                let known = grid.magnitudes[at];
-                if known == 0 {
-                    let chroma = usize::from(layer > 0);
-                    let classes = class(own, AROUND) * BEFORE + class(others, BEFORE);
-                    let frequency = shape.frequency(row, column);
-                    let by_sums = &mut contexts.by_sums[classes * 2 + chroma];
-                    let both = class(own + others, AROUND);
+                if *magnitude == 0 {
+                    let by_sums = &mut by_sums[class(own, AROUND) * BEFORE + class(others, BEFORE)];
                     let by_frequency =
-                        &mut contexts.by_frequency[(both * FREQUENCIES + frequency) * 2 + chroma];
+                        &mut by_frequency[usize::from(frequency) * AROUND + class(own + others, AROUND)];
                     if coder.bit_of_two([by_sums, by_frequency], bit) {
-                        grid.negative[at] = coder.even(wanted.is_negative(number));
-                        grid.magnitudes[at] = 1;
+                        *negative = coder.even(wanted.is_negative(number));
+                        *magnitude = 1;
                     }
                 } else {
-                    let size = known.min(3) as usize - 1;
+                    let size = (*magnitude).min(3) as usize - 1;
                     let context = &mut contexts.more[size][class(own / 8, 4)];
-                    grid.magnitudes[at] = 2 * known + u32::from(coder.bit(context, bit));
+                    *magnitude = 2 * *magnitude + u32::from(coder.bit(context, bit));
                 }
+                (left_2, left) = (left, *magnitude);
             }
         }
     }
@@ -244,16 +277,16 @@ struct Sums {
     others: Vec<u32>,
 }
 
-/// A magnitude, no larger than what sums have room for.
+/// A magnitude, no larger than what sums have room for; `LARGE` where it may be.
 #[inline]
-fn now(magnitude: u32) -> u32 {
-    magnitude.min(1 << 16)
+fn now<const LARGE: bool>(magnitude: u32) -> u32 {
+    if LARGE { magnitude.min(MOST_NOW) } else { magnitude }
 }
 
 /// Twice a magnitude that is known to the plane before only, and about what is not known of it.
 #[inline]
-fn then(magnitude: u32) -> u32 {
-    2 * now(magnitude) + u32::from(magnitude > 0)
+fn then<const LARGE: bool>(magnitude: u32) -> u32 {
+    2 * now::<LARGE>(magnitude) + u32::from(magnitude > 0)
 }
 
 impl Sums {
@@ -262,41 +295,55 @@ impl Sums {
     }
 
     /// Sums of the row that begins at `start`, of what is known before it is coded.
-    fn of_row(&mut self, shape: &Shape, grid: &Grid, before: Before<'_>, layer: usize, start: usize) {
+    fn of_row<const LARGE: bool>(
+        &mut self,
+        shape: &Shape,
+        grid: &Grid,
+        before: Before<'_>,
+        layer: usize,
+        start: usize,
+    ) {
+        let (now, then) = (now::<LARGE>, then::<LARGE>);
         let (stride, columns) = (shape.stride(), shape.columns.len());
-        self.own.fill(0);
-        let mut add = |first: usize, of: fn(u32) -> u32, weight: u32| {
-            let row = &grid.magnitudes[first..][..columns];
-            self.own.iter_mut().zip(row).for_each(|(sum, &magnitude)| *sum += weight * of(magnitude));
-        };
+        let of = |first: usize| &grid.magnitudes[first..][..columns];
         let (above, below) = (start - stride, start + stride);
-        add(above, now, 4);
-        add(above - 1, now, 2);
-        add(above + 1, now, 2);
-        add(above - stride, now, 1);
-        add(start + 1, then, 3);
-        add(below, then, 3);
-        add(start + 2, then, 1);
-        add(below + stride, then, 1);
-        add(below - 1, then, 1);
-        add(below + 1, then, 1);
-        self.others.fill(0);
+        let [up, up_left, up_right, up_2] = [above, above - 1, above + 1, above - stride].map(of);
+        let [right, right_2, down, down_2, down_left, down_right] =
+            [start + 1, start + 2, below, below + stride, below - 1, below + 1].map(of);
+        let own = &mut self.own[..columns];
+        for at in 0..columns {
+            own[at] = 4 * now(up[at])
+                + 2 * (now(up_left[at]) + now(up_right[at]))
+                + now(up_2[at])
+                + 3 * (then(right[at]) + then(down[at]))
+                + then(right_2[at])
+                + then(down_2[at])
+                + then(down_left[at])
+                + then(down_right[at]);
+        }
+        let others = &mut self.others[..columns];
+        others.fill(0);
         let shift = before.shift;
-        for (grid, [here, beside]) in before.grids.iter().zip([[4, 1], [2, 1], [2, 0]]) {
+        let finer = |magnitude: u32| now(magnitude << 1 >> shift);
+        for (grid, weight) in before.grids.iter().zip([4, 2, 2]) {
             let Some(grid) = grid else { continue };
-            let mut add = |first: usize, weight: u32| {
-                let row = &grid.magnitudes[first..][..columns];
-                let pairs = self.others.iter_mut().zip(row);
-                pairs.for_each(|(sum, &magnitude)| *sum += weight * now(magnitude << 1 >> shift));
-            };
-            add(start, here);
-            if beside > 0 {
-                [start - 1, start + 1, above, below].into_iter().for_each(|first| add(first, beside));
+            let here = &grid.magnitudes[start..][..columns];
+            for at in 0..columns {
+                others[at] += weight * finer(here[at]);
+            }
+        }
+        for grid in before.grids.iter().take(2).flatten() {
+            let of = |first: usize| &grid.magnitudes[first..][..columns];
+            let [left, right, up, down] = [start - 1, start + 1, above, below].map(of);
+            for at in 0..columns {
+                others[at] += finer(left[at]) + finer(right[at]) + finer(up[at]) + finer(down[at]);
             }
         }
         if layer > 0 {
-            let row = &grid.magnitudes[start - shape.layer()..][..columns];
-            self.others.iter_mut().zip(row).for_each(|(sum, &magnitude)| *sum += 4 * now(magnitude));
+            let here = of(start - shape.layer());
+            for at in 0..columns {
+                others[at] += 4 * now(here[at]);
+            }
         }
     }
 }

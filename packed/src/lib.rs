@@ -39,8 +39,9 @@ mod search;
 mod section;
 mod spectrum;
 mod stream;
+mod turn;
 
-pub use decode::{Ending, Plane, Unpacked, unpack};
+pub use decode::{Ending, Outline, Plane, Unpacked, outline, unpack};
 pub use encode::Packed;
 pub use error::{Error, Result};
 pub use header::{MAGIC, MOST_DIRECTIONS, MOST_SIDE};

@@ -6,18 +6,43 @@ const BITS: u32 = 15;
 /// The range never stays below this.
 const LEAST: u32 = 1 << 24;
 
-/// How fast the two estimates follow, as shifts.
-const SHIFTS: [u32; 2] = [4, 7];
+/// How fast the two estimates follow in the end: each takes 2^-shift of the way to what was seen.
+const SHIFTS: [u8; 2] = [4, 7];
 
-/// Shifts of the first symbols, so that both estimates begin as averages.
-const FIRST_SHIFTS: [u32; 28] =
-    [1, 2, 2, 2, 3, 3, 3, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5, 5, 5, 5, 5, 5, 5];
+/// Bits after which nothing changes any more.
+const SETTLED: usize = 120;
+
+/// The shifts of both estimates for each of the first bits. They begin low, so that estimates begin as averages of
+/// what was seen.
+const FIRST_SHIFTS: [[u8; 2]; SETTLED + 1] = {
+    let mut shifts = [SHIFTS; SETTLED + 1];
+    let mut seen = 0;
+    while seen < SETTLED {
+        let most = match seen {
+            0 => 1,
+            1..4 => 2,
+            4..9 => 3,
+            9..20 => 4,
+            20..60 => 5,
+            _ => 6,
+        };
+        let mut estimate = 0;
+        while estimate < 2 {
+            if SHIFTS[estimate] > most {
+                shifts[seen][estimate] = most;
+            }
+            estimate += 1;
+        }
+        seen += 1;
+    }
+    shifts
+};
 
 /// The probability of a 0, as two estimates of 16 bits; the coder takes their mean.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Probability {
     estimates: [u16; 2],
-    /// Symbols that were seen, up to all that [`FIRST_SHIFTS`] and its continuation tell apart.
+    /// Bits that were seen, up to [`SETTLED`].
     seen: u8,
 }
 
@@ -29,31 +54,26 @@ impl Default for Probability {
 
 impl Probability {
     /// Of 1 << BITS; never 0 or all.
+    #[inline]
     fn of_zero(self) -> u32 {
         let [fast, slow] = self.estimates.map(u32::from);
         ((fast + slow) >> (17 - BITS)).clamp(16, (1 << BITS) - 16)
     }
 
+    #[inline]
     fn learn(&mut self, bit: bool) {
-        let first = match FIRST_SHIFTS.get(usize::from(self.seen)) {
-            Some(&shift) => shift,
-            None if self.seen < 60 => 5,
-            None if self.seen < 120 => 6,
-            None => SHIFTS[1],
-        };
-        self.seen = self.seen.saturating_add(1);
-        for (estimate, shift) in self.estimates.iter_mut().zip(SHIFTS) {
-            let shift = shift.min(first);
-            if bit {
-                *estimate -= *estimate >> shift;
-            } else {
-                *estimate += (u16::MAX - *estimate) >> shift;
-            }
+        let seen = usize::from(self.seen).min(SETTLED);
+        self.seen += u8::from(seen < SETTLED);
+        // A 0 does to what is missing to 65535 what a 1 does to the estimate.
+        let turned = if bit { 0 } else { u16::MAX };
+        for (estimate, shift) in self.estimates.iter_mut().zip(FIRST_SHIFTS[seen]) {
+            let from = *estimate ^ turned;
+            *estimate = (from - (from >> shift)) ^ turned;
         }
     }
 }
 
-/// The probability between two, nearer to the one that is surer.
+/// The probability of a 0 in the middle between two.
 fn mean(pair: &[&mut Probability; 2]) -> u32 {
     let [a, b] = [pair[0].of_zero(), pair[1].of_zero()];
     (a + b) / 2
@@ -199,6 +219,7 @@ impl<'a> Decoder<'a> {
         self.bytes.next().map_or(0, |&byte| u32::from(byte))
     }
 
+    #[inline]
     fn split(&mut self, bound: u32) -> bool {
         let bit = self.code >= bound;
         if bit {
@@ -216,18 +237,21 @@ impl<'a> Decoder<'a> {
 }
 
 impl Coder for Decoder<'_> {
+    #[inline]
     fn bit(&mut self, probability: &mut Probability, _: bool) -> bool {
         let bit = self.split((self.range >> BITS) * probability.of_zero());
         probability.learn(bit);
         bit
     }
 
+    #[inline]
     fn bit_of_two(&mut self, pair: [&mut Probability; 2], _: bool) -> bool {
         let bit = self.split((self.range >> BITS) * mean(&pair));
         pair.into_iter().for_each(|probability| probability.learn(bit));
         bit
     }
 
+    #[inline]
     fn even(&mut self, _: bool) -> bool {
         self.split(self.range >> 1)
     }

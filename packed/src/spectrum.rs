@@ -4,6 +4,7 @@ use crate::channels::rotation;
 use crate::dct::Dct;
 use crate::model::Direction;
 use crate::polynomials::Polynomials;
+use crate::turn::transposed;
 
 /// The transforms of a model.
 pub(crate) struct Transforms {
@@ -106,10 +107,6 @@ fn mixed(weights: &[f64], polynomials: &[Vec<f64>], count: usize) -> Vec<f64> {
         }
     }
     mixed
-}
-
-fn transposed(matrix: &[f64], rows: usize, columns: usize) -> Vec<f64> {
-    (0..columns).flat_map(|x| (0..rows).map(move |y| matrix[y * columns + x])).collect()
 }
 
 #[cfg(test)]

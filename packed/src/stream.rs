@@ -36,11 +36,9 @@ pub(crate) struct Mark {
 impl Stream {
     /// Before the first section: `degrees` are those of the polynomials of views and lights.
     pub(crate) fn new(size: [usize; 2], degrees: [&[usize]; 2], channels: usize, planes: u32) -> Self {
-        let of = |list: &[usize]| list.iter().map(|&degree| degree as u16).collect();
-        let up_to = |count: usize| (0..count).map(|frequency| frequency as u16).collect();
-        let brdf =
-            Shape { kind: Kind::Brdf, layers: channels, rows: of(degrees[0]), columns: of(degrees[1]) };
-        let image = Shape { kind: Kind::Image, layers: 1, rows: up_to(size[0]), columns: up_to(size[1]) };
+        let brdf = Shape::new(Kind::Brdf, channels, degrees[0], degrees[1], planes);
+        let [rows, columns] = size.map(|side| (0..side).collect::<Vec<usize>>());
+        let image = Shape::new(Kind::Image, 1, &rows, &columns, planes);
         Self {
             mean: Grid::new(&brdf),
             brdf,

@@ -10,6 +10,7 @@ use btfkit_formats::{
     ContainerKind, Contents, Direction, ErrorKind, Images, Limits, Samples, big, bonn, directions, mif, mlvq,
 };
 
+use super::packed::PackedArchive;
 use super::{HEAD_BYTES, Options, Source, digest_of, files, read_beside};
 use crate::disk::mapped::MappedFile;
 use crate::error::{BEGIN_AGAIN, Error, Result};
@@ -44,6 +45,9 @@ impl Recognised {
 /// Opens a file that is a container by its first bytes; `None` if it is none.
 pub(super) fn recognise(path: &Path, options: &Options, limits: &Limits) -> Result<Option<Recognised>> {
     let head = files::read_head(path, HEAD_BYTES)?;
+    if head.starts_with(&btfkit_packed::MAGIC) {
+        return Ok(Some(Recognised::of(PackedArchive::open(path)?, &[])));
+    }
     let Some(kind) = ContainerKind::recognise(&head) else { return Ok(None) };
     let open = match kind {
         ContainerKind::Bonn => open_bonn,

@@ -11,6 +11,7 @@ mod files;
 pub mod hdf5;
 mod instead;
 mod matching;
+mod packed;
 mod pictures;
 mod plausibility;
 mod unnamed;

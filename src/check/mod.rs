@@ -63,17 +63,13 @@ pub fn run(source: &dyn Views, context: &Context<'_>) -> Result<(Statistics, Rep
 pub fn examine(statistics: &Statistics) -> Report {
     let saturation = samples::saturation(statistics);
     let contrast = samples::contrast(statistics, !saturation.findings.is_empty());
-    let mut checks = vec![
-        samples::numbers(statistics),
-        samples::black(statistics),
-        background::check(statistics),
-        contrast,
-    ];
+    let mut checks = vec![samples::numbers(statistics), samples::black(statistics), contrast];
     let put_off = |names: &[&'static str], reason: &str| -> Vec<Check> {
         names.iter().map(|name| Check::not_checked(name, format!("{reason}: repair that first"))).collect()
     };
     if has_fault(&checks, samples::CONTRAST) {
         let names = [
+            background::NAME,
             samples::SATURATION,
             duplicates::NAME,
             radiometry::NAME,
@@ -85,6 +81,7 @@ pub fn examine(statistics: &Statistics) -> Report {
         checks.extend(put_off(&names, "no image shows anything"));
         return Report { checks };
     }
+    checks.push(background::check(statistics));
     checks.push(saturation);
     checks.push(duplicates::check(statistics));
     if has_fault(&checks, samples::SATURATION) {

@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
@@ -6,12 +6,10 @@ use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
-use btfkit::stage::compare::By;
+use btfkit::stage::compare::{By, Subject};
 use btfkit::stage::partial::Sharing;
-use btfkit::stage::{compare, image};
-use btfkit::store;
-use btfkit::store::measurement::Measurement;
-use btfkit::store::model::{self, Model};
+use btfkit::stage::{compare, image, pack};
+use btfkit::store::{self, model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
@@ -24,13 +22,14 @@ use super::{Console, as_json};
 #[command(after_help = "\
 Examples:
   btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0
+  btf compare wood.zarr wood.btfc --tile-of wood.model.zarr            a packed model
 Share the work between processes; the figures are those of one:
   btf compare wood.zarr wood.model.zarr --partial sums --shard 0/8     ... 7/8, in any order
   btf compare wood.zarr wood.model.zarr --partial sums --reduce        exit code 66 if a part is missing")]
 pub(super) struct Compare {
     /// The measurement
     measurement: PathBuf,
-    /// The model; the two may also come the other way round
+    /// The model, or a packed model; the two may also come the other way round
     model: PathBuf,
     /// Also write a picture of the measured tile, the model's tile, and four times their difference: .png, .jpg, .webp
     /// or .tif
@@ -45,6 +44,9 @@ pub(super) struct Compare {
     /// Which values of the model to compare [default: clusters, if it has them]
     #[arg(long, value_enum)]
     by: Option<ByName>,
+    /// Of a packed model whose tile was cut: the model that it was packed from, which says where the tile lies
+    #[arg(long, value_name = "MODEL")]
+    tile_of: Option<PathBuf>,
     /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
     #[arg(long, value_name = "DIR")]
     partial: Option<PathBuf>,
@@ -77,21 +79,27 @@ impl Compare {
         self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
         // Both are read, so what they are tells which is which.
         let named = [&self.measurement, &self.model];
-        let swapped = store::kind_of(named[0]).is_ok_and(|kind| kind == model::KIND);
-        let [measurement, model] = if swapped { [named[1], named[0]] } else { named };
-        let options = compare::Options { model: model.clone(), measurement: measurement.clone() };
-        let (model, measurement) = compare::open(&options)?;
-        let by = match self.by {
-            Some(ByName::Clusters) => By::Clusters,
-            Some(ByName::Components) => By::Components,
-            None => By::of(&model)?,
+        let is_model =
+            |path: &Path| pack::is_packed(path) || store::kind_of(path).is_ok_and(|kind| kind == model::KIND);
+        let [measurement, model] = if is_model(named[0]) { [named[1], named[0]] } else { named };
+        let options = compare::Options {
+            model: model.clone(),
+            measurement: measurement.clone(),
+            by: self.by.map(|by| match by {
+                ByName::Clusters => By::Clusters,
+                ByName::Components => By::Components,
+            }),
+            tile_of: self.tile_of.clone(),
         };
+        let subject = compare::open(&options, context)?;
+        let by = subject.values.by();
+        console.notes(subject.values.notes());
         let report = match &self.partial {
-            None => compare::run(&model, &measurement, by, context)?,
+            None => compare::run(&subject, context)?,
             Some(folder) => {
                 let shard = (!self.reduce).then_some(self.shard);
                 let sharing = Sharing { folder: folder.clone(), shard };
-                let shared = compare::run_shared(&model, &measurement, by, &sharing, context)?;
+                let shared = compare::run_shared(&subject, &sharing, context)?;
                 let Some(report) = shared.report else {
                     let views = counted(shared.views, "view");
                     console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
@@ -122,15 +130,18 @@ impl Compare {
                 counted(report.colour_texels, "texel")
             ));
             if by == By::Components {
-                console.line("by the components of the model");
+                console.line(match pack::is_packed(model) {
+                    true => "by the components of the packed model",
+                    false => "by the components of the model",
+                });
             } else if report.all.hues_are_lost() {
                 console.line(format!(
                     "warning: colours are off by {:.1}, lightness only by {:.1}: clusters are formed by lightness alone, and \
                      texels of several hues share some of them; more clusters help (btf model {} {} --clusters N --force)",
                     report.all.ciede2000,
                     report.all.lightness,
-                    measurement.path().display(),
-                    model.path().display()
+                    measurement.display(),
+                    model.display()
                 ));
             }
             if report.all.samples_left_out > 0 {
@@ -138,36 +149,19 @@ impl Compare {
                 console.line(format!("{count} not finite: PSNR leaves them out, elsewhere they count as 0"));
             }
         }
-        match &self.picture {
-            Some(path) => {
-                self.side_by_side(&model, &measurement, by, context)?.write(path, context.existing)?;
-                if !self.json {
-                    let description = measurement.description();
-                    let measured = [&description.views[..], &description.lights];
-                    console.notes(&image::notes_of_directions(measured, self.view, self.light));
-                }
-                Ok(())
-            }
-            None => Ok(()),
+        let Some(path) = &self.picture else { return Ok(()) };
+        self.side_by_side(&subject, context)?.write(path, context.existing)?;
+        if !self.json {
+            let measured = subject.values.directions();
+            console.notes(&image::notes_of_directions(measured, self.view, self.light));
         }
+        Ok(())
     }
 
-    fn side_by_side(
-        &self,
-        model: &Model,
-        measurement: &Measurement,
-        by: By,
-        context: &Context<'_>,
-    ) -> Result<Picture> {
-        let tile = model.tile()?;
-        let measured = image::of_measured_tile(measurement, &tile, self.view, self.light, context)?;
-        let modelled = match by {
-            By::Clusters => {
-                let colors = image::cluster_colors(model, self.view, self.light)?;
-                image::look_up(tile.size, &model.index()?, &colors)?
-            }
-            By::Components => image::of_components(model, self.view, self.light, context)?,
-        };
+    fn side_by_side(&self, subject: &Subject, context: &Context<'_>) -> Result<Picture> {
+        let Subject { measurement, tile, values, .. } = subject;
+        let measured = image::of_measured_tile(measurement, tile, self.view, self.light, context)?;
+        let modelled = values.picture(self.view, self.light, context)?;
         let difference = false_color::difference(&measured, &modelled, 4.0);
         let factor = (384 / tile.size.height.max(tile.size.width)).max(1);
         let shown = [measured.as_display(), modelled.as_display(), difference]

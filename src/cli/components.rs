@@ -52,6 +52,7 @@ impl Components {
                 bytes_text(report.tile_bytes)
             ),
         );
+        console.notes(report.note().as_slice());
         Ok(())
     }
 }

@@ -3,8 +3,7 @@ use std::path::{Path, PathBuf};
 use btfkit::error::{Error, ErrorKind, Result};
 use btfkit::picture::Ending;
 use btfkit::run::Context;
-use btfkit::stage::export::{self, Format};
-use btfkit::store::measurement::Measurement;
+use btfkit::stage::export::{self, Format, Source};
 use clap::{Args, ValueEnum};
 
 use super::deepzoom::Deepzoom;
@@ -29,7 +28,7 @@ npy, PNG, HDF5, and EXR and Bonn's containers of halves or floats are lossless: 
 Deep Zoom shows measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the
 same command again. --rank reads the measurement many times: minutes for a small one, hours for a large one.")]
 pub(super) struct Export {
-    /// The measurement; with --deepzoom also a model or an enlargement
+    /// The measurement, or a packed model; with --deepzoom also a model or an enlargement
     store: PathBuf,
     /// The file or folder to make
     output: PathBuf,
@@ -119,14 +118,14 @@ impl Export {
         let is_idle = |name: &str| ["rank", "quality"].contains(&name) && name != used;
         given.refuse(is_idle, &format!("in {what}"), WHICH)?;
         given.refuse_all::<Deepzoom>(&format!("in {what}"), WHICH)?;
-        let measurement = Measurement::open(&self.store)?;
+        let source = Source::open(&self.store, context)?;
         let options = export::Options {
             output: self.output.clone(),
             format,
             rank: self.rank.map(|rank| rank as usize),
             quality: self.quality.unwrap_or(100),
         };
-        let report = export::run(&measurement, &options, context)?;
+        let report = export::run(&source, &options, context)?;
         console.line(format!(
             "{}: {}{}",
             self.output.display(),

@@ -365,6 +365,7 @@ fn of_model(about: &Modelled) -> Rows {
             "components" => {
                 let Some(report) = &about.components else { continue };
                 rows.push(row!["  components", report.components]);
+                rows.extend(report.note().map(|note| row!["  note", note]));
                 rows.extend(report.psnr_db.map(|psnr| row!["  PSNR", format!("{psnr:.2} dB")]));
                 rows.push(row!["  arrays", bytes_text(report.bytes)]);
                 rows.extend(report.texts.iter().map(|(name, text)| row![format!("  {name}"), text]));

@@ -7,6 +7,7 @@ use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
 use btfkit::stage::render::{self, CameraOptions, EnvironmentOptions, Motion, Options, Shape};
+use btfkit::stage::values::By;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
@@ -27,11 +28,12 @@ Examples:
   btf render wood.model.zarr --shape cylinder --frames 48 --turntable --out turn.png      turn-01.png to turn-48.png
   btf render wood.model.zarr --shape plane --frames 36 --light-sweep --shard 0/4 --out sweep.jpg
   btf render wood.model.zarr --shape interior --compare --out methods.png
+  btf render wood.btfc --out packed.png
 Coordinates: x to the right, y up, z towards the default camera. The object lies around the origin and has a radius of 1.
 One light shows a perfect white diffuser that faces it as white, as in `btf image`. Light that one surface reflects onto
 another is not computed.")]
 pub(super) struct Render {
-    /// A model, whose tile is shown, or an enlargement
+    /// A model or a packed model, whose tile is shown, or an enlargement
     source: PathBuf,
     /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. With --frames its name is followed
     /// by a number
@@ -119,14 +121,25 @@ pub(super) struct Render {
     plane: bool,
     #[command(flatten)]
     variation: PlaneArgs,
+    /// Which values texels have [default: model]
+    #[arg(long, value_enum)]
+    values: Option<ValuesName>,
     /// Show five ways to cover the object with the material of a model, side by side with labels: the tile repeated, two
     /// tiles that join each other, the paper's rule with a 2D and a 3D random field, and the coherent rule
-    #[arg(long, conflicts_with_all = ["frames", "plane", "model", "show_environment"])]
+    #[arg(long, conflicts_with_all = ["frames", "plane", "model", "show_environment", "values"])]
     compare: bool,
     /// The model of an enlargement [default: where it was when the enlargement was made; else of that name beside it
     /// or in the current folder]
     #[arg(long, conflicts_with = "plane")]
     model: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ValuesName {
+    /// Those of the model's clusters; of its components if it has no clusters
+    Model,
+    /// Those of the model's components (btf components)
+    Components,
 }
 
 fn size(text: &str) -> std::result::Result<Size, String> {
@@ -195,6 +208,7 @@ impl Render {
         let options = Options {
             model: self.model.clone(),
             plane: self.plane.then(|| self.variation.options()),
+            values: matches!(self.values, Some(ValuesName::Components)).then_some(By::Components),
             shape: match (&self.mesh, self.shape) {
                 (Some(path), _) => Shape::Mesh(path.clone()),
                 (None, ShapeName::Flat) => Shape::Flat,

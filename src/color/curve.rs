@@ -59,12 +59,91 @@ impl Curve {
     }
 }
 
-fn on_curve(sample: f64, transfer: Transfer) -> f32 {
+/// Steps of the table of [`Linear`] within one of 255: linear between them, it is within 3e-8.
+const STEPS: usize = 16;
+
+/// From the curve to linear reflectance, many times.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Linear {
+    table: Vec<f32>,
+}
+
+impl Linear {
+    pub(crate) fn new() -> Self {
+        let steps = WHITE as usize * STEPS;
+        let of = |step: usize| srgb_decode(step as f64 / steps as f64) as f32;
+        Self { table: (0..=steps).map(of).collect() }
+    }
+
+    /// Of one value; what is no finite number is 0.
+    #[inline]
+    pub(crate) fn of(&self, value: f32) -> f32 {
+        if !(0.0..WHITE).contains(&value) {
+            let linear = srgb_decode(f64::from(value) / f64::from(WHITE)) as f32;
+            return if linear.is_finite() { linear } else { 0.0 };
+        }
+        let place = value * STEPS as f32;
+        let step = (place as usize).min(self.table.len() - 2);
+        self.table[step] + (place - step as f32) * (self.table[step + 1] - self.table[step])
+    }
+}
+
+/// Samples that the curve does not hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Unheld {
+    /// Beyond its largest value, in either direction.
+    pub(crate) beyond: u64,
+    /// No finite numbers: they are 0 on it.
+    pub(crate) not_finite: u64,
+}
+
+impl std::ops::AddAssign for Unheld {
+    fn add_assign(&mut self, other: Self) {
+        self.beyond += other.beyond;
+        self.not_finite += other.not_finite;
+    }
+}
+
+impl Curve {
+    /// How many of a run of samples the curve does not hold.
+    pub(crate) fn unheld(&self, samples: &Samples, range: Range<usize>) -> Unheld {
+        let mut unheld = Unheld::default();
+        let mut count = |sample: f64| {
+            if !sample.is_finite() {
+                unheld.not_finite += 1;
+            } else if exact(sample, self.transfer).abs() > f64::from(LARGEST) {
+                unheld.beyond += 1;
+            }
+        };
+        match samples {
+            Samples::U8(_) | Samples::U16(_) => {}
+            Samples::F16(list) => list[range].iter().for_each(|sample| count(sample.to_f64())),
+            Samples::F32(list) => list[range].iter().for_each(|&sample| count(f64::from(sample))),
+        }
+        unheld
+    }
+
+    /// The largest sample that the curve holds.
+    pub(crate) fn largest(&self) -> f64 {
+        let value = f64::from(LARGEST) / f64::from(WHITE);
+        match self.transfer {
+            Transfer::Srgb => value,
+            Transfer::Linear => srgb_decode(value),
+        }
+    }
+}
+
+/// A sample on the curve.
+fn exact(sample: f64, transfer: Transfer) -> f64 {
     let value = match transfer {
         Transfer::Srgb => sample,
         Transfer::Linear => Transfer::Srgb.encode(sample),
     };
-    let value = (f64::from(WHITE) * value) as f32;
+    f64::from(WHITE) * value
+}
+
+fn on_curve(sample: f64, transfer: Transfer) -> f32 {
+    let value = exact(sample, transfer) as f32;
     if value.is_finite() { value.clamp(-LARGEST, LARGEST) } else { 0.0 }
 }
 
@@ -116,10 +195,35 @@ mod tests {
     }
 
     #[test]
+    fn the_table_is_the_curve() {
+        let linear = Linear::new();
+        for k in -3000..12_000 {
+            let value = k as f32 * 0.0301;
+            let exact = srgb_decode(f64::from(value) / 255.0);
+            let off = (f64::from(linear.of(value)) - exact).abs();
+            assert!(off <= 2e-7 * exact.abs().max(1.0), "{value}: {off}");
+        }
+        assert_eq!((linear.of(255.0), linear.of(f32::NAN), linear.of(f32::INFINITY)), (1.0, 0.0, 0.0));
+    }
+
+    #[test]
     fn what_is_not_finite_is_black() {
         let mut values = [1.0; 4];
         let given = Samples::F32(vec![f32::NAN, f32::INFINITY, 0.5, -3e30]);
         Curve::new(SampleType::F32, Transfer::Srgb).values(&given, 0..4, &mut values);
         assert_eq!(values, [0.0, 0.0, 127.5, -LARGEST]);
+        for transfer in [Transfer::Srgb, Transfer::Linear] {
+            let curve = Curve::new(SampleType::F32, transfer);
+            let most = curve.largest() as f32;
+            let given =
+                Samples::F32(vec![f32::NAN, f32::NEG_INFINITY, 0.999 * most, 1.001 * most, -3e30, 2.0]);
+            assert_eq!(curve.unheld(&given, 0..6), Unheld { beyond: 2, not_finite: 2 });
+            assert_eq!(curve.unheld(&given, 2..3), Unheld::default());
+        }
+        let halves = Samples::F16(vec![f16::MAX, f16::NAN, f16::MIN]);
+        for transfer in [Transfer::Srgb, Transfer::Linear] {
+            let found = Curve::new(SampleType::F16, transfer).unheld(&halves, 0..3);
+            assert_eq!(found, Unheld { beyond: 0, not_finite: 1 });
+        }
     }
 }

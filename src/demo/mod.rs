@@ -157,11 +157,14 @@ fn run_with(settings: &Settings, folder: &Path, context: &Context<'_>) -> Result
     }
 
     // These are made anew by every run: they read what the stages left and take a few seconds.
-    let compare = compare::Options { model: model.clone(), measurement: measurement.clone() };
-    let compared = times.time("compare", false, || {
-        let (model, measurement) = compare::open(&compare)?;
-        compare::run(&model, &measurement, compare::By::Clusters, context)
-    })?;
+    let compare = compare::Options {
+        model: model.clone(),
+        measurement: measurement.clone(),
+        by: Some(compare::By::Clusters),
+        tile_of: None,
+    };
+    let compared =
+        times.time("compare", false, || compare::run(&compare::open(&compare, context)?, context))?;
     let workshop = Workshop::open([&measurement, &model, &enlarged, &by_paper], settings.seed, context)?;
     let places = [&archive, &measurement, &model, &enlarged].map(PathBuf::as_path);
     let figures = Figures::gather(&workshop, compared, places, context)?;

@@ -11,7 +11,7 @@ use crate::shape::{Area, Size};
 pub const PIECE_SIDE: usize = 512;
 
 /// Bytes of a piece.
-pub const PIECE_BYTES: u64 = (PIECE_SIDE * PIECE_SIDE * size_of::<u16>()) as u64;
+pub const PIECE_BYTES: u64 = (PIECE_SIDE * PIECE_SIDE * size_of::<u32>()) as u64;
 
 /// Which entry of a model each texel is.
 pub enum Texture {
@@ -22,14 +22,14 @@ pub enum Texture {
         /// Whether it repeats; if not, its outermost texels are continued.
         wraps: bool,
         /// As many as the size says.
-        index: Vec<u16>,
+        index: Vec<u32>,
     },
     /// Piece by piece.
     Pieces(Pieces),
 }
 
 /// Makes or reads the entries of an area, row by row.
-pub type Maker = Box<dyn Fn(Area) -> Result<Vec<u16>> + Send + Sync>;
+pub type Maker = Box<dyn Fn(Area) -> Result<Vec<u32>> + Send + Sync>;
 
 /// A texture of which only the most recently used pieces are kept.
 pub struct Pieces {
@@ -50,7 +50,7 @@ struct Kept {
 /// A piece; narrower and lower at the far borders.
 struct Piece {
     width: usize,
-    entries: Vec<u16>,
+    entries: Vec<u32>,
 }
 
 impl Pieces {
@@ -110,7 +110,7 @@ impl Texels for Reader<'_> {
         let pieces = match self.texture {
             Texture::Whole { size, wraps, index } => {
                 let [row, column] = self.within([row, column], *size, *wraps);
-                return Ok(usize::from(index[row * size.width + column]));
+                return Ok(index[row * size.width + column] as usize);
             }
             Texture::Pieces(pieces) => pieces,
         };
@@ -125,9 +125,7 @@ impl Texels for Reader<'_> {
         }
         let piece = self.last.as_ref().map(|(_, piece)| piece);
         let entry = piece.and_then(|piece| piece.entries.get(row * piece.width + column));
-        entry
-            .map(|&entry| usize::from(entry))
-            .ok_or_else(|| crate::Error::internal("a piece that is too small"))
+        entry.map(|&entry| entry as usize).ok_or_else(|| crate::Error::internal("a piece that is too small"))
     }
 }
 

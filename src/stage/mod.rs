@@ -23,4 +23,5 @@ pub mod sample;
 pub mod slurm;
 pub mod status;
 pub mod tile;
+pub mod values;
 pub mod verify;

@@ -2,31 +2,27 @@
 
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{Angles, Direction};
+use btfkit_formats::Direction;
 use btfkit_packed as packed;
 use serde::Serialize;
 
 use crate::color::Transfer;
-use crate::disk::mapped::MappedFile;
 use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::method::tile::Tile;
-use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::Context;
-use crate::run::recipe::{self, Recipe};
+use crate::run::recipe::Recipe;
 use crate::shape::Size;
+use crate::stage::compare::same_directions;
 use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
-use crate::store::measurement::Description;
 use crate::store::model::components::{ComponentsRecipe, Found};
 use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage, UNPACKED};
-use crate::zarr::samples_named;
-
-/// Ending of a packed model's name.
-pub const ENDING: &str = ".btfc";
+pub use crate::store::packed::{ENDING, is_packed};
+use crate::store::packed::{LICENCE, MEASUREMENT, PackedFile, SAMPLES, TEXEL_MM, TRANSFER};
 
 /// How small, or how good.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,13 +71,6 @@ pub struct Packed {
     pub made: Option<Made>,
 }
 
-/// Names of texts in a packed model.
-const SAMPLES: &str = "samples";
-const TRANSFER: &str = "transfer";
-const MEASUREMENT: &str = "measurement";
-const LICENCE: &str = "licence";
-const TEXEL_MM: &str = "texel_mm";
-
 /// Those that a model holds in its tile.
 const OF_THE_TILE: [&str; 3] = [SAMPLES, TRANSFER, MEASUREMENT];
 
@@ -91,11 +80,6 @@ fn transfer_name(transfer: Transfer) -> &'static str {
         Transfer::Srgb => "srgb",
         Transfer::Linear => "linear",
     }
-}
-
-/// What the packer found, as an error of this program.
-fn of_packed(path: &Path, error: &packed::Error) -> Error {
-    Error::input(format!("{}: {error}", path.display()))
 }
 
 /// Packs the components of a model.
@@ -237,52 +221,16 @@ pub struct About {
     pub notes: Vec<String>,
 }
 
-/// Whether a file is a packed model, by its name or its first bytes.
-pub fn is_packed(path: &Path) -> bool {
-    path.is_file() && (ends_with(path, ENDING) || begins_so(path))
-}
-
-fn begins_so(path: &Path) -> bool {
-    MappedFile::open(path).is_ok_and(|file| file.as_ref().starts_with(&packed::MAGIC))
-}
-
-/// Reads a packed model.
-fn read(path: &Path) -> Result<(packed::Unpacked, String, usize)> {
-    let file = MappedFile::open(path).map_err(|error| Error::io("open", path, error))?;
-    let bytes: &[u8] = file.as_ref();
-    let unpacked = packed::unpack(bytes).map_err(|error| of_packed(path, &error))?;
-    Ok((unpacked, recipe::digest_bytes(bytes), bytes.len()))
-}
-
-/// What there is to say of the end of a packed model.
-fn notes(unpacked: &packed::Unpacked) -> Vec<String> {
-    let (there, all) = (unpacked.planes.len(), unpacked.sections);
-    match unpacked.ending {
-        packed::Ending::Whole => vec![],
-        packed::Ending::Cut(at) => {
-            vec![format!(
-                "the file was cut: {there} of {all} planes are there, up to byte {at}; it is coarser than it was"
-            )]
-        }
-        packed::Ending::Damaged(at) => vec![format!(
-            "the plane that begins at byte {at} is damaged: {there} of {all} planes are read; get the file anew for the rest"
-        )],
-    }
-}
-
-fn text<'a>(texts: &'a [(String, String)], name: &str) -> Option<&'a str> {
-    texts.iter().find(|(found, _)| found == name).map(|(_, text)| text.as_str())
-}
-
 /// What a packed model holds.
 ///
 /// # Errors
-/// A file that is none, or is damaged before its first plane ends.
+/// A file that is none, or is damaged before its first plane ends; channels that are not understood.
 pub fn about(path: &Path) -> Result<About> {
-    let (unpacked, _, bytes) = read(path)?;
-    let notes = notes(&unpacked);
-    let packed::Unpacked { model, planes, .. } = unpacked;
-    let values = (model.texels() * model.brdf()) as u64;
+    let file = PackedFile::open(path)?;
+    let (notes, samples) = (file.notes(), file.sample_type());
+    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, .. } = file.outline;
+    let brdf = views.len() * lights.len() * channels.len();
+    let values = (size[0] * size[1] * brdf) as u64;
     let plane = |plane: &packed::Plane| Plane {
         bytes: plane.end,
         components: plane.components,
@@ -290,84 +238,16 @@ pub fn about(path: &Path) -> Result<About> {
     };
     Ok(About {
         kind: "packed model",
-        size: [model.size[1], model.size[0]],
-        wraps: model.wraps,
-        directions: [model.views.len(), model.lights.len()],
+        size: [size[1], size[0]],
+        wraps,
+        directions: [views.len(), lights.len()],
         bytes,
-        tile_bytes: text(&model.texts, SAMPLES)
-            .and_then(samples_named)
-            .map(|samples| samples.bytes() as u64 * values),
+        tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
-        channels: model.channels,
-        texts: model.texts,
+        channels,
+        texts,
         notes,
     })
-}
-
-/// A packed model, opened to be evaluated.
-pub(crate) struct Opened {
-    pub(crate) components: Components,
-    pub(crate) views: Vec<Direction>,
-    pub(crate) lights: Vec<Direction>,
-    /// Digest of the file.
-    pub(crate) digest: String,
-    /// What is wrong with its end.
-    pub(crate) notes: Vec<String>,
-}
-
-/// Opens a packed model to be evaluated.
-///
-/// # Errors
-/// A file that is none, or is damaged before its first plane ends; too little memory.
-pub(crate) fn open(path: &Path, context: &Context<'_>) -> Result<Opened> {
-    let (unpacked, digest, bytes) = read(path)?;
-    let notes = notes(&unpacked);
-    let from = unpacked.model;
-    context.require("a packed model", memory_bytes(&from, bytes))?;
-    let count = from.components.len();
-    let turned = |of: fn(&packed::Component) -> &Vec<f64>, length: usize| {
-        let mut all = vec![0.0; length * count];
-        for (number, part) in from.components.iter().enumerate() {
-            let places = all.iter_mut().skip(number).step_by(count);
-            places.zip(of(part)).for_each(|(to, &value)| *to = value as f32);
-        }
-        all
-    };
-    let [height, width] = from.size;
-    Ok(Opened {
-        components: Components {
-            size: Size::new(height, width),
-            brdf: [from.views.len(), from.lights.len()],
-            mean: from.mean.iter().map(|&value| value as f32).collect(),
-            basis: turned(|part| &part.basis, from.brdf()),
-            coefficients: turned(|part| &part.coefficients, from.texels()),
-            channels: from.channels.clone(),
-        },
-        views: directions(path, &from.views)?,
-        lights: directions(path, &from.lights)?,
-        digest,
-        notes,
-    })
-}
-
-/// Memory that a packed model takes in f64 and f32, beside its bytes.
-fn memory_bytes(model: &packed::Model, bytes: usize) -> u64 {
-    (bytes + 24 * (model.components.len() + 1) * (model.brdf() + model.texels())) as u64
-}
-
-/// Directions of a packed model.
-fn directions(file: &Path, list: &[packed::Direction]) -> Result<Vec<Direction>> {
-    let direction = |direction: &packed::Direction| {
-        let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
-        angles.map(Angles::direction).ok_or_else(|| {
-            let packed::Direction { theta_deg, phi_deg } = direction;
-            Error::input(format!(
-                "{}: got the direction theta {theta_deg}, phi {phi_deg}, which is none",
-                file.display()
-            ))
-        })
-    };
-    list.iter().map(direction).collect()
 }
 
 /// What was unpacked.
@@ -383,40 +263,20 @@ pub struct Restored {
     pub notes: Vec<String>,
 }
 
-/// How near directions are that are one, in each coordinate: files hold them as degrees of finite precision.
-const NEAR: f64 = 1e-3;
-
 /// Makes a model of a packed one, with a tile and components.
 ///
 /// # Errors
 /// A file that is none; a model there that is another; those of writing.
 pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restored> {
-    let (unpacked, digest, bytes) = read(file)?;
-    let notes = notes(&unpacked);
-    let psnr_db = unpacked.planes.last().map(|plane| plane.decibels).filter(|&decibels| decibels > 0.0);
-    let packed::Unpacked { model: from, .. } = unpacked;
-    let sample_type =
-        text(&from.texts, SAMPLES).and_then(samples_named).unwrap_or(btfkit_formats::SampleType::F32);
-    let transfer = match text(&from.texts, TRANSFER) {
-        Some("linear") => Transfer::Linear,
-        _ => Transfer::Srgb,
-    };
-    let [height, width] = from.size;
-    let size = Size::new(height, width);
-    let description = Description {
-        size,
-        channels: from.channels.clone(),
-        sample_type,
-        views: directions(file, &from.views)?,
-        lights: directions(file, &from.lights)?,
-        transfer,
-        white: 1.0,
-    };
-    // A model whose channels are not understood could not be shown.
-    description.decoder()?;
-    context.require("unpacking components", memory_bytes(&from, bytes))?;
+    let opened = PackedFile::open(file)?;
+    let notes = opened.notes();
+    let from = opened.model(context)?;
+    let psnr_db = opened.outline.planes.last().map(|plane| plane.decibels).filter(|&found| found > 0.0);
+    let named = opened.text(MEASUREMENT).map(str::to_owned);
+    let PackedFile { description, digest, .. } = opened;
+    let (size, transfer) = (description.size, description.transfer);
     let model = Model::create(path, context)?;
-    let named = text(&from.texts, MEASUREMENT).map_or_else(|| format!("{UNPACKED}{digest}"), str::to_owned);
+    let named = named.unwrap_or_else(|| format!("{UNPACKED}{digest}"));
     let tile = if from.wraps { "periodic" } else { "none" }.to_owned();
     let tile_recipe = TileRecipe { measurement: named, tile, seed: 1, lattice: None }.to_value()?;
     if let Some(_lock) = model.begin(Stage::Tile, &tile_recipe, context)? {
@@ -428,7 +288,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
             uncut_visibility: 1.0,
             transfer,
             channels: Some(from.channels.clone()),
-            samples: Some(sample_type.name().to_owned()),
+            samples: Some(description.sample_type.name().to_owned()),
             measurement_size: from.size,
             lattice: Lattice::default(),
             cells: vec![],
@@ -440,16 +300,10 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
     }
     // A tile that was there is taken by its recipe, which a file only claims.
     let [views, lights] = model.directions()?;
-    let is_same = |there: &[Direction], given: &[Direction]| {
-        let near = |(a, b): (&Direction, &Direction)| {
-            a.vector().iter().zip(b.vector()).all(|(a, b)| (a - b).abs() < NEAR)
-        };
-        there.len() == given.len() && there.iter().zip(given).all(near)
-    };
     if model.tile()?.size != size
         || model.tile_report()?.channels.as_ref() != Some(&from.channels)
-        || !is_same(&views, &description.views)
-        || !is_same(&lights, &description.lights)
+        || !same_directions(&views, &description.views)
+        || !same_directions(&lights, &description.lights)
     {
         return Err(Error::recipe(format!(
             "{}: its tile is not that of {}: another size, other channels or directions",
@@ -481,6 +335,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         components,
         strengths: vec![],
         squared_error: None,
+        not_finite: 0,
         psnr_db,
         bytes: model.bytes_of_components(components)?,
         tile_bytes: description.bytes(),

@@ -8,6 +8,7 @@ pub mod enlarged;
 pub mod measurement;
 pub mod model;
 pub(crate) mod origin;
+pub(crate) mod packed;
 pub mod recognise;
 
 use std::path::Path;

@@ -111,6 +111,13 @@ fn of_file(head: &[u8]) -> Other {
         _ if starts(b"\x89PNG") || starts(b"\xff\xd8\xff") || starts(b"II*\0") || starts(b"MM\0*") => {
             ("a picture", Use::Advice("a folder of pictures can be imported: btf import FOLDER NAME.zarr"))
         }
+        _ if starts(&btfkit_packed::MAGIC) => (
+            "a packed model",
+            Use::Advice(
+                "make a measurement of it, and of that what you need: btf import FILE NAME.zarr, btf model NAME.zarr; or a \
+                 model with components alone: btf unpack FILE NAME.model.zarr",
+            ),
+        ),
         _ if starts(b"\x76\x2f\x31\x01") => {
             ("a picture", Use::Advice("a folder of pictures can be imported: btf import FOLDER NAME.zarr"))
         }
@@ -283,6 +290,7 @@ mod tests {
                 "a Deep Zoom pyramid",
                 "name the store",
             ),
+            (b"BTFC\x01rest", "a packed model", "btf import FILE NAME.zarr"),
             (b"anything else", "a file", import),
             (b"", "a file", import),
         ] {

@@ -83,7 +83,7 @@ fn a_model_of_components_is_pictured_and_an_enlargement_with_them() {
     copy(&fixture().model(), &whole);
     let told =
         fail(btf().arg("image").arg(&whole).args(["--values", "components", "--out"]).arg(at("i.png")), 66);
-    assert!(told.contains("run `btf components` on it first"), "{told}");
+    assert!(told.contains("run btf components MEASUREMENT"), "{told}");
     succeed(btf().arg("components").args([&fixture().measurement(), &whole]));
     let picture = |source: &Path, name: &str, options: &[&str]| {
         let told = succeed(btf().arg("image").arg(source).args(options).arg("--out").arg(at(name)));
@@ -148,7 +148,8 @@ fn a_packed_file_is_told_of_cut_and_never_trusted() {
     };
     let told = succeed(pack("30kB").args(["--licence", "CC-BY-4.0", "--texel-mm", "0.25"]));
     assert!(
-        told.contains("of the tile's samples") && told.contains("may serve the same bytes better"),
+        told.contains("of the tile's samples")
+            && told.contains("may be nearer to the measurement: btf components"),
         "{told}"
     );
     let about = json(btf().arg("info").arg(&file));

@@ -136,7 +136,7 @@ fn use_it(path: &Path, context: &Context<'_>) {
         Measurement::open(path).and_then(|measurement| {
             let output = folder.path().join("out.npy");
             let options = export::Options { output, format: export::Format::Npy, rank: None, quality: 90 };
-            export::run(&measurement, &options, context).map(drop)
+            export::run(&export::Source::of(measurement), &options, context).map(drop)
         }),
         enlarge_it(path, &output, context),
         deepzoom::plan(

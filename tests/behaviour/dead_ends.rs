@@ -90,7 +90,6 @@ fn what_is_advised_of_a_model_that_lacks_stages_is_accepted_and_then_the_command
             "image m.model.zarr --what normals --out n.png",
             "image m.model.zarr --values components --out c.png",
             "pack m.model.zarr p.btfc --quality 1:10",
-            "judge m.model.zarr --size 96x96 --against m.zarr --crop 16",
         ] {
             let folder = tempfile::tempdir().unwrap();
             partial(folder.path(), stages);

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use btfkit_formats::Samples;
 
+use super::components::ComponentTable;
 use super::locate::Share;
 use crate::color::Decoder;
 
@@ -31,6 +32,31 @@ pub trait Values: Sync {
     fn of(&self, entry: usize, mixture: &Mixture<'_>) -> [f32; 3];
     /// How many entries there are.
     fn entries(&self) -> usize;
+}
+
+/// Values of either kind.
+pub enum Table {
+    /// Of clusters: an entry is a cluster.
+    Clusters(ClusterTable),
+    /// Of components: an entry is a texel of the tile.
+    Components(ComponentTable),
+}
+
+impl Values for Table {
+    #[inline]
+    fn of(&self, entry: usize, mixture: &Mixture<'_>) -> [f32; 3] {
+        match self {
+            Self::Clusters(table) => table.of(entry, mixture),
+            Self::Components(table) => table.of(entry, mixture),
+        }
+    }
+
+    fn entries(&self) -> usize {
+        match self {
+            Self::Clusters(table) => table.entries(),
+            Self::Components(table) => table.entries(),
+        }
+    }
 }
 
 /// The clusters' representatives as linear RGB, [cluster, view, light]: what is asked for together lies together.

@@ -1,26 +1,27 @@
-//! Model against measurement: how well the tile is reconstructed from its index and representatives, or from its
-//! components.
+//! Model against measurement: how well the tile is reconstructed from its index and representatives, from its
+//! components, or from a packed file.
 
-mod modelled;
+use std::path::{Path, PathBuf};
 
-use std::path::PathBuf;
-
+use btfkit_formats::Direction;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::color::{ciede2000, lab};
 use crate::error::{Error, Result};
+use crate::method::tile::Tile;
 use crate::run::progress::Counted;
 use crate::run::recipe::METHOD;
 use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::partial::{Partial, Sharing};
+pub use crate::stage::values::By;
+use crate::stage::values::{TileSamples, TileValues};
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
+use crate::store::packed::{Packed, is_packed};
 use crate::words::counted;
-pub use modelled::By;
-use modelled::Modelled;
 
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
@@ -34,10 +35,15 @@ const COLOUR_STEPS: usize = 2000;
 /// What to compare.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The model.
+    /// The model, or a packed model.
     pub model: PathBuf,
     /// The measurement that it was made from.
     pub measurement: PathBuf,
+    /// Which values of a model: what it has where absent, clusters if it has both.
+    pub by: Option<By>,
+    /// The model that a packed one was made of: it says where the tile lies in the measurement. Not needed where the
+    /// tile is all of the measurement.
+    pub tile_of: Option<PathBuf>,
 }
 
 /// Errors of the reconstructed tile.
@@ -176,14 +182,102 @@ impl Sums {
     }
 }
 
+/// What is compared, opened.
+pub struct Subject {
+    /// The measurement.
+    pub measurement: Measurement,
+    /// Where the tile lies in it.
+    pub tile: Tile,
+    /// The values of the tile.
+    pub values: TileValues,
+    /// What the values depend on, for sums that are shared.
+    digest: String,
+}
+
 /// Opens what is compared.
 ///
 /// # Errors
-/// Where the model is not of this measurement.
-pub fn open(options: &Options) -> Result<(Model, Measurement)> {
+/// Where the model is not of this measurement; a packed model of a tile whose place is not known.
+pub fn open(options: &Options, context: &Context<'_>) -> Result<Subject> {
+    if is_packed(&options.model) {
+        return open_packed(options, context);
+    }
+    if let Some(path) = &options.tile_of {
+        return Err(Error::usage(format!(
+            "{}: --tile-of is for packed models, a model knows its tile",
+            path.display()
+        ))
+        .hint("leave it out"));
+    }
     let model = Model::open(&options.model)?;
     let measurement = open_measurement_of(&model, &options.measurement)?;
-    Ok((model, measurement))
+    let by = options.by.map_or_else(|| By::of(&model), Ok)?;
+    let digest = model.digest_of(&[Stage::Tile, by.stage()])?;
+    let values = TileValues::of_model(&model, by, context)?;
+    Ok(Subject { tile: model.tile()?, measurement, values, digest })
+}
+
+fn open_packed(options: &Options, context: &Context<'_>) -> Result<Subject> {
+    let name = options.model.display();
+    if options.by == Some(By::Clusters) {
+        return Err(Error::usage(format!("{name}: a packed model has components and no clusters"))
+            .hint("leave out --by"));
+    }
+    let packed = Packed::open(&options.model, context)?;
+    let description = &packed.description;
+    let (measurement, tile, of) = match &options.tile_of {
+        Some(path) => {
+            let model = Model::open(path)?;
+            (open_measurement_of(&model, &options.measurement)?, model.tile()?, path.as_path())
+        }
+        None => {
+            let measurement = Measurement::open(&options.measurement)?;
+            expect_whole(&packed, &measurement, &options.model)?;
+            let tile = Tile::whole(measurement.description().size, packed.wraps);
+            (measurement, tile, options.measurement.as_path())
+        }
+    };
+    let measured = measurement.description();
+    let same = tile.size == description.size
+        && measured.channels == description.channels
+        && same_directions(&measured.views, &description.views)
+        && same_directions(&measured.lights, &description.lights);
+    if !same {
+        return Err(Error::recipe(format!(
+            "{name}: its tile is not that of {}: another size, other channels or directions",
+            of.display()
+        ))
+        .hint("name what the packed model was made of"));
+    }
+    let digest = packed.digest.clone();
+    Ok(Subject { measurement, tile, values: TileValues::of_opened(packed)?, digest })
+}
+
+/// Checks that the tile of a packed model is all of a measurement.
+fn expect_whole(packed: &Packed, measurement: &Measurement, file: &Path) -> Result<()> {
+    let (name, of) = (file.display(), measurement.path().display());
+    match packed.measurement.as_deref() {
+        Some(digest) if digest == measurement.digest() => Ok(()),
+        Some(_) => {
+            Err(Error::recipe(format!("{name} was not made of {of}, or of it as it was imported before"))
+                .hint("name the measurement that it was made of"))
+        }
+        None => {
+            Err(Error::usage(format!("{name}: its tile was cut from a measurement, it does not say where"))
+                .hint("name the model that it was packed from: --tile-of MODEL"))
+        }
+    }
+}
+
+/// How near directions are that are one, in each coordinate: files hold them as degrees of finite precision.
+const NEAR: f64 = 1e-3;
+
+/// Whether two lists of directions are one, but for the precision of files.
+pub(crate) fn same_directions(a: &[Direction], b: &[Direction]) -> bool {
+    let near = |(a, b): (&Direction, &Direction)| {
+        a.vector().iter().zip(b.vector()).all(|(a, b)| (a - b).abs() < NEAR)
+    };
+    a.len() == b.len() && a.iter().zip(b).all(near)
 }
 
 /// What was compared by a run that shares the work.
@@ -203,9 +297,9 @@ pub struct Shared {
 ///
 /// # Errors
 /// Those of reading, and too little memory.
-pub fn run(model: &Model, measurement: &Measurement, by: By, context: &Context<'_>) -> Result<Report> {
-    let views: Vec<usize> = (0..measurement.description().views.len()).collect();
-    let comparison = Comparison::open(model, measurement, by, context)?;
+pub fn run(subject: &Subject, context: &Context<'_>) -> Result<Report> {
+    let views: Vec<usize> = (0..subject.measurement.description().views.len()).collect();
+    let comparison = Comparison::open(subject)?;
     let sums = comparison.sums(&views, context, |_, _| Ok(()))?;
     Ok(comparison.report(&sums))
 }
@@ -215,28 +309,30 @@ pub fn run(model: &Model, measurement: &Measurement, by: By, context: &Context<'
 ///
 /// # Errors
 /// As [`run`]; and [`crate::ErrorKind::Missing`] where nothing is to be compared but something is missing.
-pub fn run_shared(
-    model: &Model,
-    measurement: &Measurement,
-    by: By,
-    sharing: &Sharing,
-    context: &Context<'_>,
-) -> Result<Shared> {
-    let n_views = measurement.description().views.len();
+pub fn run_shared(subject: &Subject, sharing: &Sharing, context: &Context<'_>) -> Result<Shared> {
+    let n_views = subject.measurement.description().views.len();
     let what = json!({
-        "stage": "compare", "method": METHOD, "measurement": measurement.digest(),
-        "model": model.digest_of(&[Stage::Tile, by.stage()])?,
+        "stage": "compare", "method": METHOD, "measurement": subject.measurement.digest(),
+        "model": subject.digest,
     });
     let partial = Partial::at(&sharing.folder, &what)?;
-    let kept = || (0..n_views).map(|view| partial.read::<Sums>(view)).collect::<Vec<_>>();
-    let comparison = Comparison::open(model, measurement, by, context)?;
+    let comparison = Comparison::open(subject)?;
+    let kept = || {
+        let read = |view| match partial.read::<Sums>(view) {
+            Some(sums) => comparison.expect_possible(&sums).map(|()| Some(sums)).map_err(|error| {
+                error.context(partial.path(view).display()).hint("delete this file and run its part again")
+            }),
+            None => Ok(None),
+        };
+        (0..n_views).map(read).collect::<Result<Vec<_>>>()
+    };
     if let Some(shard) = sharing.shard {
-        let found = kept();
+        let found = kept()?;
         let missing: Vec<usize> =
             (0..n_views).filter(|&view| shard.has(view) && found[view].is_none()).collect();
         comparison.sums(&missing, context, |view, sums| partial.write(view, sums))?;
     }
-    let sums = kept();
+    let sums = kept()?;
     let done = sums.iter().flatten().count();
     let folder = partial.folder().to_owned();
     if done < n_views && sharing.shard.is_none() {
@@ -257,14 +353,14 @@ struct Comparison<'a> {
     bounds: Window,
     /// Texels of the tile, within the bounds.
     offsets: Vec<usize>,
-    modelled: Modelled,
+    modelled: TileSamples<'a>,
     /// Of so many texels one's colours are compared.
     stride: usize,
 }
 
 impl<'a> Comparison<'a> {
-    fn open(model: &Model, measurement: &'a Measurement, by: By, context: &Context<'_>) -> Result<Self> {
-        let (tile, modelled) = (model.tile()?, Modelled::open(model, by, context)?);
+    fn open(Subject { measurement, tile, values, .. }: &'a Subject) -> Result<Self> {
+        let modelled = values.samples()?;
         let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
         let stride = offsets.len().div_ceil(COLOUR_TEXELS);
         Ok(Self { measurement, bounds, offsets, modelled, stride })
@@ -291,6 +387,40 @@ impl<'a> Comparison<'a> {
         })?;
         context.progress.end();
         Ok(sums)
+    }
+
+    /// Checks that sums may be those of a view: a seal says only that nobody changed them by accident.
+    ///
+    /// # Errors
+    /// Counts that are not those of a view, and sums that no view has.
+    fn expect_possible(&self, sums: &Sums) -> Result<()> {
+        let description = self.measurement.description();
+        let lights = description.lights.len() as u64;
+        let texels = self.offsets.len() as u64;
+        let coloured = self.offsets.len().div_ceil(self.stride) as u64 * lights;
+        let samples = texels * description.texel_samples() as u64;
+        let steps = sums.colours.iter().try_fold(0u64, |sum, &count| sum.checked_add(count));
+        for (what, found, expected) in [
+            ("views", Some(sums.views as u64), 1),
+            ("texels", Some(sums.code_count), texels * lights),
+            ("samples", sums.sample_count.checked_add(sums.left_out), samples),
+            ("colours", Some(sums.colour_count), coloured),
+            ("colours by steps", steps, coloured),
+        ] {
+            if found != Some(expected) {
+                let found = found.map_or("more than can be counted".to_owned(), |found| found.to_string());
+                return Err(Error::input(format!("got {found} {what}, expected {expected}")));
+            }
+        }
+        let is_sum = |sum: f64| sum.is_finite() && sum >= 0.0;
+        if sums.codes > 255 * sums.code_count || sums.colours.len() > COLOUR_STEPS + 1 {
+            return Err(Error::input("got differences of lightness or colour beyond the largest there are"));
+        }
+        if !is_sum(sums.squares) || !is_sum(sums.colour) {
+            let found = format!("{} and {}", sums.squares, sums.colour);
+            return Err(Error::input(format!("got the sums {found}, expected finite ones of at least 0")));
+        }
+        Ok(())
     }
 
     fn of_view(&self, view: usize) -> Result<Sums> {

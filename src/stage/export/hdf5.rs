@@ -2,16 +2,15 @@
 
 use btfkit_formats::Contents;
 
-use super::{Options, Written};
+use super::{Options, Source, Written};
 use crate::archive::hdf5::Writer;
 use crate::color::Transfer;
 use crate::error::Result;
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
-use crate::store::measurement::Measurement;
 
-pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
-    let description = measurement.description();
+pub(super) fn write(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
+    let description = source.description();
     let contents = Contents {
         format: "measurement store".to_owned(),
         width: description.size.width as u32,
@@ -25,15 +24,15 @@ pub(super) fn write(measurement: &Measurement, options: &Options, context: &Cont
         assumptions: Vec::new(),
         remarks: Vec::new(),
     };
-    let mut writer = Writer::create(&options.output, &contents, &measurement.attributes()?)?
-        .with_existing(context.existing);
+    let mut writer =
+        Writer::create(&options.output, &contents, &source.attributes()?)?.with_existing(context.existing);
     let whole = description.size.window();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     let codes = (description.size.texels() * description.lights.len()) as u64;
     let in_flight = read_ahead::in_flight(context.work_bytes(), description.view_bytes() + codes);
     let read = |view| {
-        let samples = measurement.read_reflectance(view, whole)?;
-        Ok((view, samples, measurement.read_luminance(view, whole)?))
+        let samples = source.read_reflectance(view, whole)?;
+        Ok((view, samples, source.read_luminance(view, whole)?))
     };
     read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, samples, codes)| {
         writer.write_view(view, &samples, Some(&codes))?;

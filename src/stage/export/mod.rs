@@ -1,4 +1,4 @@
-//! Measurement to archive: so that others' programs open what we hold, and nobody is locked in.
+//! Measurement, or packed model, to archive: so that others' programs open what we hold, and nobody is locked in.
 
 mod bonn;
 #[cfg(feature = "hdf5")]
@@ -16,8 +16,10 @@ use crate::disk::output::{Made, expect_outside_stores};
 use crate::error::{Error, Result};
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
-use crate::store::measurement::Measurement;
+use crate::shape::Window;
 use crate::store::measurement::gather::images_of_texels;
+use crate::store::measurement::{Description, Measurement};
+use crate::store::packed::{Packed, is_packed};
 
 /// A view as it is read, turned into images, and encoded.
 const VIEW_COPIES: u64 = 4;
@@ -68,36 +70,131 @@ pub struct Report {
 /// Whether it was there already, and what other programs will not like.
 type Written = (Made, Vec<String>);
 
-/// Writes a whole measurement as an archive.
+/// What is exported: samples of a plane under all pairs of directions.
+pub struct Source(Kept);
+
+enum Kept {
+    Measurement(Measurement),
+    /// The tile of a packed model.
+    Packed(Box<Packed>),
+}
+
+impl Source {
+    /// Opens a measurement, or a packed model.
+    ///
+    /// # Errors
+    /// Where there is neither, or it is damaged; too little memory.
+    pub fn open(path: &Path, context: &Context<'_>) -> Result<Self> {
+        Ok(Self(match is_packed(path) {
+            true => Kept::Packed(Box::new(Packed::open(path, context)?)),
+            false => Kept::Measurement(Measurement::open(path)?),
+        }))
+    }
+
+    /// Of a measurement that is open.
+    pub fn of(measurement: Measurement) -> Self {
+        Self(Kept::Measurement(measurement))
+    }
+
+    /// What there is to say of what was opened, a sentence each.
+    fn notes(&self) -> Vec<String> {
+        match &self.0 {
+            Kept::Measurement(_) => vec![],
+            Kept::Packed(packed) => packed.notes.clone(),
+        }
+    }
+
+    /// Memory that stays taken, bytes.
+    fn memory_bytes(&self) -> u64 {
+        match &self.0 {
+            Kept::Measurement(_) => 0,
+            Kept::Packed(packed) => packed.memory_bytes,
+        }
+    }
+
+    fn description(&self) -> &Description {
+        match &self.0 {
+            Kept::Measurement(measurement) => measurement.description(),
+            Kept::Packed(packed) => &packed.description,
+        }
+    }
+
+    /// Checks that all of it is there.
+    fn expect_complete(&self) -> Result<()> {
+        let Kept::Measurement(measurement) = &self.0 else { return Ok(()) };
+        let (views, done) = (measurement.description().views.len(), measurement.views_done());
+        if done == views {
+            return Ok(());
+        }
+        let found = format!("{}: {done} of {views} views are there", measurement.path().display());
+        Err(Error::missing(found).hint("finish its import first"))
+    }
+
+    /// Samples of a window of a view, [y, x, light, channel].
+    fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
+        match &self.0 {
+            Kept::Measurement(measurement) => measurement.read_reflectance(view, window),
+            Kept::Packed(packed) => {
+                let Packed { components, description, .. } = &**packed;
+                let lights = 0..description.lights.len();
+                let (sample_type, transfer) = (description.sample_type, description.transfer);
+                Ok(components.samples(view, lights, window, sample_type, transfer))
+            }
+        }
+    }
+
+    /// Their L* codes, [y, x, light].
+    #[cfg(feature = "hdf5")]
+    fn read_luminance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
+        match &self.0 {
+            Kept::Measurement(measurement) => measurement.read_luminance(view, window),
+            Kept::Packed(packed) => {
+                let (samples, codes) = (self.read_reflectance(view, window)?, packed.description.codes()?);
+                let channels = packed.description.n_channels();
+                Ok((0..samples.len()).step_by(channels).map(|at| codes.code(&samples, at)).collect())
+            }
+        }
+    }
+
+    /// What else is known of it, as attributes.
+    #[cfg(feature = "hdf5")]
+    fn attributes(&self) -> Result<serde_json::Map<String, serde_json::Value>> {
+        match &self.0 {
+            Kept::Measurement(measurement) => measurement.attributes(),
+            Kept::Packed(packed) => {
+                let texts = packed.texts.iter().map(|(name, text)| (name.clone(), text.clone().into()));
+                Ok(texts.collect())
+            }
+        }
+    }
+}
+
+/// Writes a whole measurement, or the tile of a packed model, as an archive.
 ///
 /// # Errors
 /// A measurement that is not complete, or that the format cannot hold; [`crate::ErrorKind::Recipe`] where other files
 /// are.
-pub fn run(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Report> {
+pub fn run(source: &Source, options: &Options, context: &Context<'_>) -> Result<Report> {
     expect_outside_stores(&options.output)?;
-    let views = measurement.description().views.len();
-    let done = measurement.views_done();
-    if done < views {
-        let found = format!("{}: {done} of {views} views are there", measurement.path().display());
-        return Err(Error::missing(found).hint("finish its import first"));
-    }
-    let description = measurement.description();
+    source.expect_complete()?;
+    let description = source.description();
     let what = format!(
         "exporting views of {} under {}",
         description.size,
         counted(description.lights.len(), "light")
     );
-    context.require(&what, VIEW_COPIES * description.view_bytes())?;
-    let (made, warnings) = match options.format {
-        Format::Ubo2003 => pictures::ubo2003(measurement, options, context)?,
-        Format::Exr => pictures::folder(measurement, options, pictures::FileKind::Exr, context)?,
-        Format::Png => pictures::folder(measurement, options, pictures::FileKind::Png, context)?,
-        Format::Npy => npy::write(measurement, options, context)?,
-        Format::Hdf5 => hdf5(measurement, options, context)?,
-        Format::Dfmf => bonn::dfmf(measurement, options, context)?,
-        Format::Fmf => bonn::fmf(measurement, options, context)?,
+    context.require(&what, source.memory_bytes() + VIEW_COPIES * description.view_bytes())?;
+    let (made, more) = match options.format {
+        Format::Ubo2003 => pictures::ubo2003(source, options, context)?,
+        Format::Exr => pictures::folder(source, options, pictures::FileKind::Exr, context)?,
+        Format::Png => pictures::folder(source, options, pictures::FileKind::Png, context)?,
+        Format::Npy => npy::write(source, options, context)?,
+        Format::Hdf5 => hdf5(source, options, context)?,
+        Format::Dfmf => bonn::dfmf(source, options, context)?,
+        Format::Fmf => bonn::fmf(source, options, context)?,
     };
     context.progress.end();
+    let warnings = [source.notes(), more].concat();
     Ok(Report { made, bytes: bytes_of(&options.output), warnings })
 }
 
@@ -106,7 +203,7 @@ use crate::words::counted;
 use hdf5::write as hdf5;
 
 #[cfg(not(feature = "hdf5"))]
-fn hdf5(_: &Measurement, options: &Options, _: &Context<'_>) -> Result<Written> {
+fn hdf5(_: &Source, options: &Options, _: &Context<'_>) -> Result<Written> {
     Err(crate::archive::hdf5::not_built_in(&options.output))
 }
 
@@ -121,16 +218,16 @@ fn bytes_of(path: &Path) -> u64 {
 
 /// Calls `each` with every view and its images, [light, y, x, channel].
 fn for_each_view(
-    measurement: &Measurement,
+    source: &Source,
     context: &Context<'_>,
     mut each: impl FnMut(usize, Samples) -> Result<()>,
 ) -> Result<()> {
-    let description = measurement.description();
+    let description = source.description();
     context.progress.begin("export", description.views.len() as u64, Counted::Items("views"));
     // Read as texels, then turned, then encoded.
     let in_flight = read_ahead::in_flight(context.work_bytes(), VIEW_COPIES * description.view_bytes());
     let read = |view| {
-        let texels = measurement.read_reflectance(view, description.size.window())?;
+        let texels = source.read_reflectance(view, description.size.window())?;
         Ok((view, images_of_texels(&texels, description.lights.len(), description.n_channels())))
     };
     read_ahead::for_each(context, in_flight, 0..description.views.len(), read, |(view, images)| {

@@ -4,15 +4,14 @@ use std::io::Write;
 
 use btfkit_formats::npy::{channels_file, directions_file, header, sample_bytes};
 
-use super::{Options, Written, for_each_view};
+use super::{Options, Source, Written, for_each_view};
 use crate::color::Transfer;
 use crate::disk::output;
 use crate::error::{Error, Result};
 use crate::run::Context;
-use crate::store::measurement::Measurement;
 
-pub(super) fn write(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
-    let description = measurement.description();
+pub(super) fn write(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
+    let description = source.description();
     let (height, width) = (description.size.height, description.size.width);
     let shape = [description.views.len(), description.lights.len(), height, width, description.n_channels()];
     let failed = |error| Error::io("write", &options.output, error);
@@ -27,9 +26,7 @@ pub(super) fn write(measurement: &Measurement, options: &Options, context: &Cont
         .collect::<Result<Vec<_>>>()?;
     files.push(output::prepare(&options.output, context.existing, |output| {
         output.write_all(&header(shape.map(|n| n as u64), description.sample_type)).map_err(failed)?;
-        for_each_view(measurement, context, |_, images| {
-            output.write_all(&sample_bytes(&images)).map_err(failed)
-        })
+        for_each_view(source, context, |_, images| output.write_all(&sample_bytes(&images)).map_err(failed))
     })?);
     let made = output::publish_all(files)?;
     let floats = matches!(description.sample_type.name(), "float16" | "float32");

@@ -9,13 +9,13 @@ use btfkit_formats::zip::ZipWriter;
 use btfkit_formats::{Direction, SampleType, Samples};
 use rayon::prelude::*;
 
-use super::{Options, Written, for_each_view, linear};
+use super::{Options, Source, Written, for_each_view, linear};
 use crate::color::srgb_encode_u8;
 use crate::disk::output;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::stage::loss::{self, Beyond, Takes};
-use crate::store::measurement::{Description, Measurement};
+use crate::store::measurement::Description;
 
 /// Format of the pictures in a folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -25,12 +25,8 @@ pub(super) enum FileKind {
 }
 
 /// A zip of JPEGs with UBO2003's names.
-pub(super) fn ubo2003(
-    measurement: &Measurement,
-    options: &Options,
-    context: &Context<'_>,
-) -> Result<Written> {
-    let description = measurement.description();
+pub(super) fn ubo2003(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
+    let description = source.description();
     let whole_degrees = |list: &[Direction]| -> Result<Vec<Angles>> {
         list.iter()
             .map(|direction| {
@@ -54,7 +50,7 @@ pub(super) fn ubo2003(
     let beyond = Beyond::default();
     let made = output::write_whole(&options.output, context.existing, |output| {
         let mut zip = ZipWriter::new(output);
-        for_each_view(measurement, context, |view, images| {
+        for_each_view(source, context, |view, images| {
             let display = display_codes(&images, description, &beyond)?;
             let image = display.len() / lights.len();
             let encoded: Vec<Vec<u8>> = context.install(|| {
@@ -95,12 +91,12 @@ fn display_codes(images: &Samples, description: &Description, beyond: &Beyond) -
 
 /// A folder of pictures, one folder a view, named by their angles in degrees: light fastest.
 pub(super) fn folder(
-    measurement: &Measurement,
+    source: &Source,
     options: &Options,
     kind: FileKind,
     context: &Context<'_>,
 ) -> Result<Written> {
-    let description = measurement.description();
+    let description = source.description();
     let integers = matches!(description.sample_type, SampleType::U8 | SampleType::U16);
     if kind == FileKind::Png && (!integers || !matches!(description.n_channels(), 1 | 3)) {
         return Err(Error::input(format!(
@@ -117,7 +113,7 @@ pub(super) fn folder(
         }
     };
     let made = output::write_whole_folder(&options.output, context.existing, |root| {
-        for_each_view(measurement, context, |view, images| {
+        for_each_view(source, context, |view, images| {
             let image = images.len() / description.lights.len();
             context.install(|| {
                 description.lights.par_iter().enumerate().try_for_each(|(light, direction)| {

@@ -21,9 +21,10 @@ use crate::run::{Context, read_ahead};
 use crate::shape::{Area, Size, Window};
 use crate::stage::loss::Beyond;
 use crate::store::measurement::Measurement;
-use crate::store::model::{Model, Stage};
+use crate::store::model::Model;
 use btfkit_formats::{Direction, Samples};
 pub(crate) use find::{model_of, of_stage};
+pub(crate) use open::without_source;
 use scene::MEASUREMENT_ROWS;
 pub(crate) use scene::plane_rows;
 pub use scene::{Band, Scene};
@@ -275,25 +276,6 @@ pub fn cluster_colors(model: &Model, view: Direction, light: Direction) -> Resul
         colors.extend(appearance.of_brdfs(&representatives.samples, representatives.shape, &decoder));
     }
     Ok(colors)
-}
-
-/// The tile of a model under a light, seen from a view, by its components.
-///
-/// # Errors
-/// A model without components, and too little memory.
-pub fn of_components(
-    model: &Model,
-    view: Direction,
-    light: Direction,
-    context: &Context<'_>,
-) -> Result<Picture> {
-    of_stage(model, Stage::Components, |model| {
-        context.require("a picture by components", model.components_bytes()?)?;
-        let components = model.components()?;
-        let appearance = appearance_of(model, view, light)?;
-        let colors = context.install(|| components.colors(&appearance))?;
-        Ok(Picture::linear(components.size, colors))
-    })
 }
 
 /// How the values of a model are mixed under a light, seen from a view.

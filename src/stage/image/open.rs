@@ -1,22 +1,24 @@
 //! Opens what is to be pictured: a measurement, a model's tile or its endless plane, an enlarged index.
 
+use std::path::Path;
+
 use btfkit_formats::Direction;
 
 use super::find::{measurement_of, model_of, of_stage};
-use super::recipe::{Endless, Packed, PlaneValues, SceneRecipe, Stored, ValuesName, window_of};
+use super::recipe::{Endless, Packed, SceneRecipe, Stored, ValuesName, window_of};
 use super::scene::{Scene, Source};
 use super::{
-    Appearance, Options, PlaneOptions, Subject, Values, cluster_colors, look_up, measured_appearance,
-    notes_of_directions, of_components, of_measured_tile,
+    Options, PlaneOptions, Subject, Values, cluster_colors, look_up, measured_appearance,
+    notes_of_directions, of_measured_tile,
 };
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::Plane;
-use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::{Picture, false_color};
 use crate::run::Context;
 use crate::shape::{Area, Size};
 use crate::stage::pack;
+use crate::stage::values::{By, TileValues};
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::kind_of;
 use crate::store::measurement::{self, Measurement};
@@ -29,8 +31,17 @@ struct Opened {
     size: Size,
     /// As in a [`Scene`].
     directions: Vec<String>,
-    /// Digest of the components, where they were asked for.
-    components: Option<String>,
+    /// Where values come from.
+    values: ValuesName,
+}
+
+/// The picture of a tile, and what it was made of.
+struct Shown {
+    picture: Picture,
+    /// The stage of the model that is shown.
+    stage: Stage,
+    values: ValuesName,
+    notes: Vec<String>,
 }
 
 impl Scene {
@@ -52,13 +63,13 @@ impl Scene {
             )));
         }
         type Of = fn(Stored) -> SceneRecipe;
-        let (Opened { source, size, directions, components }, of, digest): (_, Of, _) =
+        let (Opened { source, size, directions, values }, of, digest): (_, Of, _) =
             match (kind, options.plane) {
                 (model::KIND, Some(plane)) => return of_plane(&Model::open(path)?, options, plane, context),
                 (model::KIND, None) => {
                     let model = Model::open(path)?;
-                    let opened = of_tile(&model, options, context)?;
-                    (opened, SceneRecipe::Model, shown_digest(&model, options)?)
+                    let (opened, stage) = of_tile(&model, options, context)?;
+                    (opened, SceneRecipe::Model, model.stage_digest(stage)?)
                 }
                 (measurement::KIND, _) => {
                     let measurement = Measurement::open(path)?;
@@ -77,11 +88,7 @@ impl Scene {
             digest,
             size: [size.height, size.width],
             window: (area != whole).then(|| window_of(area)),
-            values: match options.values {
-                Values::Model => None,
-                Values::Measured(_) => Some(ValuesName::Measured),
-                Values::Components => Some(ValuesName::Components(components)),
-            },
+            values: Some(values).filter(|values| *values != ValuesName::Model),
         });
         let incomplete = source.incomplete(path);
         Ok(Self::new(source, area, recipe, directions, incomplete))
@@ -102,7 +109,7 @@ fn of_measurement(measurement: Measurement, options: &Options) -> Result<Opened>
         source: Source::Measurement { measurement, appearance, decoder },
         size,
         directions,
-        components: None,
+        values: ValuesName::Model,
     })
 }
 
@@ -134,84 +141,57 @@ fn of_packed(options: &Options, context: &Context<'_>) -> Result<Scene> {
     let Subject::Appearance { view, light } = options.subject else {
         return Err(refused("no index and no normals"));
     };
-    let opened = pack::open(&options.source, context)?;
-    let area = shown_part(options, opened.components.size)?;
-    let [views, lights] =
-        [&opened.views, &opened.lights].map(|list| Interpolator::new(list, &triangulate(list)));
-    let appearance = Appearance::new(&views, &lights, view, light);
-    let colors = context.install(|| opened.components.colors(&appearance))?;
-    let mut directions = notes_of_directions([&opened.views, &opened.lights], view, light);
-    directions.extend(opened.notes);
-    let source = Source::Tile(Picture::linear(opened.components.size, colors));
-    let recipe = SceneRecipe::Packed(Packed { digest: opened.digest, window: window_of(area) });
+    let values = TileValues::of_packed(&options.source, context)?;
+    let area = shown_part(options, values.size())?;
+    let mut directions = notes_of_directions(values.directions(), view, light);
+    directions.extend_from_slice(values.notes());
+    let source = Source::Tile(values.picture(view, light, context)?);
+    let recipe = SceneRecipe::Packed(Packed { digest: values.digest().to_owned(), window: window_of(area) });
     Ok(Scene::new(source, area, recipe, directions, None))
 }
 
-fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Opened> {
-    let tile = tile_picture(model, options, context)?;
-    let size = tile.size;
-    let mut directions = of_model(model, options)?;
-    let is_lit = matches!(options.subject, Subject::Appearance { .. });
-    if options.values == Values::Model && is_lit && by_components(model, &options.values)? {
-        directions.push("the model has no clusters: values are those of its components".to_owned());
-    }
-    Ok(Opened { source: Source::Tile(tile), size, directions, components: components_of(model, options)? })
+/// The tile of a model, and which of its stages is shown.
+fn of_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<(Opened, Stage)> {
+    let Shown { picture, stage, values, notes: directions } = shown_tile(model, options, context)?;
+    Ok((Opened { size: picture.size, source: Source::Tile(picture), directions, values }, stage))
 }
 
-/// Digest of a model's components, where values are theirs by option.
-fn components_of(model: &Model, options: &Options) -> Result<Option<String>> {
-    let wanted = options.values == Values::Components;
-    wanted.then(|| model.stage_digest(Stage::Components)).transpose()
-}
-
-/// Digest of the stage of a model that a picture of its tile shows.
-fn shown_digest(model: &Model, options: &Options) -> Result<String> {
-    let is_lit = matches!(options.subject, Subject::Appearance { .. });
-    let stage =
-        if is_lit && by_components(model, &options.values)? { Stage::Components } else { Stage::Cluster };
-    model.stage_digest(stage)
-}
-
-/// Whether values come from the components: where they are asked for, and where there are no clusters.
-fn by_components(model: &Model, values: &Values) -> Result<bool> {
-    Ok(match values {
-        Values::Components => true,
-        Values::Model => !model.has(Stage::Cluster)? && model.has(Stage::Components)?,
-        Values::Measured(_) => false,
-    })
-}
-
-/// What is to be said of the directions of a picture of a model.
-fn of_model(model: &Model, options: &Options) -> Result<Vec<String>> {
-    let Subject::Appearance { view, light } = options.subject else { return Ok(Vec::new()) };
-    let [views, lights] = model.directions()?;
-    Ok(notes_of_directions([&views, &lights], view, light))
-}
-
-/// The tile's texels under the light, by clusters or as measured, or in false colours.
-fn tile_picture(model: &Model, options: &Options, context: &Context<'_>) -> Result<Picture> {
-    let tile = model.tile()?;
-    match (options.subject, &options.values) {
-        (Subject::Appearance { view, light }, values) if by_components(model, values)? => {
-            of_components(model, view, light, context)
-        }
-        (Subject::Appearance { view, light }, Values::Model | Values::Components) => {
-            let colors = of_stage(model, Stage::Cluster, |model| cluster_colors(model, view, light))?;
-            look_up(tile.size, &of_stage(model, Stage::Cluster, Model::index)?, &colors)
-        }
-        (Subject::Appearance { view, light }, Values::Measured(path)) => {
-            let measurement = measurement_of(model, path.as_deref())?;
-            of_measured_tile(&measurement, &tile, view, light, context)
-        }
-        (Subject::Index, _) => {
+/// The tile's texels under the light, by the values that were asked for, or in false colours. Of the model nothing else
+/// is opened.
+fn shown_tile(model: &Model, options: &Options, context: &Context<'_>) -> Result<Shown> {
+    let size = model.tile_report()?.size();
+    let false_colors = |picture, stage| Shown { picture, stage, values: ValuesName::Model, notes: vec![] };
+    let (view, light) = match options.subject {
+        Subject::Appearance { view, light } => (view, light),
+        Subject::Index => {
             let index = of_stage(model, Stage::Cluster, Model::index)?;
-            let pixels = look_up(tile.size, &index, &colors_by_lightness(model)?)?.pixels;
-            Ok(Picture::display(tile.size, pixels))
+            let pixels = look_up(size, &index, &colors_by_lightness(model)?)?.pixels;
+            return Ok(false_colors(Picture::display(size, pixels), Stage::Cluster));
         }
-        (Subject::Normals, _) => {
-            Ok(false_color::normals(tile.size, &of_stage(model, Stage::Normals, Model::normals)?))
+        Subject::Normals => {
+            let normals = of_stage(model, Stage::Normals, Model::normals)?;
+            return Ok(false_colors(false_color::normals(size, &normals), Stage::Normals));
         }
+    };
+    let [views, lights] = model.directions()?;
+    let mut notes = notes_of_directions([&views, &lights], view, light);
+    let (by, values) = match &options.values {
+        Values::Measured(path) => {
+            let measurement = measurement_of(model, path.as_deref())?;
+            let picture = of_measured_tile(&measurement, &model.tile()?, view, light, context)?;
+            return Ok(Shown { picture, stage: Stage::Tile, values: ValuesName::Measured, notes });
+        }
+        Values::Components => {
+            let digest = model.stage_digest(Stage::Components)?;
+            (By::Components, ValuesName::Components(digest))
+        }
+        Values::Model => (By::of(model)?, ValuesName::Model),
+    };
+    if (&options.values, by) == (&Values::Model, By::Components) {
+        notes.push("the model has no clusters: values are those of its components".to_owned());
     }
+    let picture = TileValues::of_model(model, by, context)?.picture(view, light, context)?;
+    Ok(Shown { picture, stage: by.stage(), values, notes })
 }
 
 /// False colours of a model's clusters, by how light they are when looked at and lit from above.
@@ -225,7 +205,7 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
     let area = options.window.ok_or_else(|| {
         Error::usage("an endless plane has no size of its own: say which part with --window x,y,width,height")
     })?;
-    let tile = tile_picture(model, options, context)?;
+    let Shown { picture: tile, values, notes: directions, .. } = shown_tile(model, options, context)?;
     let appearance = of_stage(model, Stage::Appearance, Model::appearance)?;
     let index = of_stage(model, Stage::Cluster, Model::index)?;
     let plane = context.compute(|| Plane::new(tile.size, &index, &appearance, Kernel::fastest()))?;
@@ -237,25 +217,28 @@ fn of_plane(model: &Model, options: &Options, which: PlaneOptions, context: &Con
         seed: variation.seed,
         jitter: variation.jitter,
         window: window_of(area),
-        values: match options.values {
-            Values::Model => PlaneValues::Model,
-            Values::Components => PlaneValues::Components,
-            Values::Measured(_) => PlaneValues::Measured,
-        },
-        components: components_of(model, options)?,
+        values,
     });
-    let directions = of_model(model, options)?;
     Ok(Scene::new(Source::Plane { plane, variation, tile }, area, recipe, directions, None))
+}
+
+/// That an enlargement does not keep what values of single texels need.
+pub(crate) fn without_source(path: &Path) -> Error {
+    Error::missing(format!("{} does not say which texel of the tile each of its texels is", path.display()))
+        .hint(
+            "enlarge by another --method than paper, without --no-source, under another name or with --force",
+        )
 }
 
 fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> Result<Opened> {
     let size = enlarged.size();
-    let (mut directions, mut components) = (Vec::new(), None);
+    let (mut directions, mut values) = (Vec::new(), ValuesName::Model);
     let source = match options.subject {
         Subject::Appearance { view, light } if options.values == Values::Model => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
             let colors = cluster_colors(&model, view, light)?;
-            directions = of_model(&model, options)?;
+            let [views, lights] = model.directions()?;
+            directions = notes_of_directions([&views, &lights], view, light);
             Source::Clusters { enlarged, colors }
         }
         Subject::Index => {
@@ -265,22 +248,17 @@ fn of_enlarged(enlarged: Enlarged, options: &Options, context: &Context<'_>) -> 
         Subject::Normals if enlarged.has_normals() => Source::Normals(enlarged),
         Subject::Appearance { .. } | Subject::Normals if enlarged.has_source() => {
             let model = model_of(&enlarged, &options.source, options.model.as_deref())?;
-            let tile = tile_picture(&model, options, context)?;
-            components = components_of(&model, options)?;
-            directions = of_model(&model, options)?;
-            Source::Sources { enlarged, tile }
+            let shown = shown_tile(&model, options, context)?;
+            (directions, values) = (shown.notes, shown.values);
+            Source::Sources { enlarged, tile: shown.picture }
         }
         Subject::Normals => {
             return Err(Error::missing(format!("{} has no normals", options.source.display()))
                 .hint("enlarge with --keep-normals to have them, under another name or with --force"));
         }
         Subject::Appearance { .. } => {
-            return Err(Error::missing(format!(
-                "{} does not say which texel of the tile each of its texels is",
-                options.source.display()
-            ))
-            .hint("enlarge by another --method than paper, without --no-source, under another name or with --force"));
+            return Err(without_source(&options.source));
         }
     };
-    Ok(Opened { source, size, directions, components })
+    Ok(Opened { source, size, directions, values })
 }

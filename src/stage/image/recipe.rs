@@ -38,7 +38,7 @@ pub struct Packed {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
-    /// Digest of what made it.
+    /// Digest of what made it: of a model, of the stage that is shown.
     pub digest: String,
     /// Rows and columns of all of it.
     pub size: [usize; 2],
@@ -63,32 +63,19 @@ pub struct Endless {
     /// The part that is shown: x, y, width, height.
     pub window: [i64; 4],
     /// Where values come from.
-    pub values: PlaneValues,
-    /// Digest of the components, where values are theirs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub components: Option<String>,
+    pub values: ValuesName,
 }
 
-/// Where the values of texels of a plane come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Where the values of texels come from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum PlaneValues {
+pub enum ValuesName {
     /// The representatives of the clusters.
     Model,
     /// The measurement.
     Measured,
-    /// The components.
-    Components,
-}
-
-/// Where the values of texels come from, where it is not the model.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum ValuesName {
-    /// The measurement.
-    Measured,
     /// The components of this digest.
-    Components(Option<String>),
+    Components(String),
 }
 
 /// A part of a plane: x, y, width, height.

@@ -7,11 +7,14 @@ use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::coherent::Plane;
 use crate::method::value::evaluator::Evaluator;
-use crate::method::value::table::ClusterTable;
+use crate::method::value::table::{Table, Values};
 use crate::render::texture::{Maker, PIECE_BYTES, Pieces, Texture};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::shape::{Area, Size};
-use crate::stage::image::{PlaneOptions, model_of, of_stage};
+use crate::stage::image::{PlaneOptions, model_of, of_stage, without_source};
+use crate::stage::pack;
+use crate::stage::values::{By, TileValues, beyond};
 use crate::store::enlarged::{self, Enlarged};
 use crate::store::model::{self, Model, Stage};
 use crate::store::recognise::article;
@@ -21,18 +24,27 @@ use crate::zarr::Store;
 /// Memory of a texel of a plane while a piece of it is made, with what lies around the piece.
 const PLANE_PIECE_BYTES: u64 = 4 * 24 * 512 * 512;
 
+/// Memory of a texel of a tile: its number, where it was cut from, and what is read beside.
+const INDEX_BYTES: u64 = 16;
+
+/// Memory beside values while they are read: chunks of a store, and a piece of a texture.
+pub(super) const SPARE_BYTES: u64 = (32 << 20) + PIECE_BYTES;
+
 /// A material.
 pub(super) struct Material {
-    pub(super) evaluator: Evaluator,
+    pub(super) evaluator: Evaluator<Table>,
     pub(super) texture: Texture,
     /// Size of the texture and whether it repeats; none where it is endless.
     pub(super) bounds: Option<(Size, bool)>,
     pub(super) notes: Vec<String>,
 }
 
-/// Opens what is to be shown; `beside` is memory that is taken already.
-pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
+/// Opens what is to be shown.
+pub(super) fn open(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
     let path = &options.source;
+    if pack::is_packed(path) {
+        return of_packed(options, room, context);
+    }
     let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND])?;
     let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
     if kind != model::KIND && options.plane.is_some() {
@@ -44,75 +56,114 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
     }
     if kind == model::KIND {
         let model = Model::open(path)?;
-        let (evaluator, notes) = evaluator(&model, beside, context)?;
+        let (values, mut notes) = values(&model, options.values, room, context)?;
         let (texture, bounds) = match options.plane {
-            Some(which) => (endless(&model, which, context)?, None),
-            None => tile(&model, None)?,
+            Some(which) => (endless(&model, &values, which, room, context)?, None),
+            None => tile(&values, None, room)?,
         };
+        let (evaluator, more) = values.into_evaluator(context)?;
+        notes.extend(more);
         return Ok(Material { evaluator, texture, bounds, notes });
     }
     let enlarged = Enlarged::open(path)?;
     let model = model_of(&enlarged, path, options.model.as_deref())?;
-    let (evaluator, mut notes) = evaluator(&model, beside, context)?;
+    let (values, mut notes) = values(&model, options.values, room, context)?;
+    let by_texel = values.by() == By::Components;
+    if by_texel && !enlarged.has_source() {
+        return Err(without_source(path));
+    }
     let missing = enlarged.shards().texels() - enlarged.shards_done();
     if missing > 0 {
         notes.push(format!("{} is not complete: {} missing", path.display(), counted(missing, "shard")));
     }
     let bounds = Some((enlarged.size(), enlarged.recipe().tileable));
+    let (evaluator, more) = values.into_evaluator(context)?;
+    notes.extend(more);
+    let count = evaluator.values().entries();
     let read: Maker = Box::new(move |area: Area| {
         let window = area.within_first_quadrant().ok_or_else(|| Error::internal("a window below 0"))?;
-        enlarged.read(window)
+        let entries = match by_texel {
+            true => enlarged.read_source(window)?.unwrap_or_default(),
+            false => enlarged.read(window)?.into_iter().map(u32::from).collect(),
+        };
+        expect_within(&entries, count)?;
+        Ok(entries)
     });
-    let texture = Texture::Pieces(Pieces::new(read, bounds, context.work_bytes() / 4));
+    let texture = pieces(read, bounds, room);
     Ok(Material { evaluator, texture, bounds, notes })
 }
 
-/// The clusters of a model, decoded.
-pub(super) fn evaluator(
+/// The tile of a packed model.
+fn of_packed(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
+    let refused = |what: &str, why: &str| {
+        Error::usage(format!("{}: {what}, and this is a packed model: {why}", options.source.display()))
+            .hint("leave the option out")
+    };
+    if options.plane.is_some() {
+        return Err(refused("an endless plane is made of a model", "it has its tile only"));
+    }
+    if options.model.is_some() {
+        return Err(refused("--model names the model of an enlargement", "it has its own values"));
+    }
+    if options.values == Some(By::Clusters) {
+        return Err(refused("values of clusters were asked for", "it has components only"));
+    }
+    let values = TileValues::of_packed(&options.source, context)?;
+    values.take(SPARE_BYTES, room)?;
+    let (texture, bounds) = tile(&values, None, room)?;
+    let (evaluator, notes) = values.into_evaluator(context)?;
+    Ok(Material { evaluator, texture, bounds, notes })
+}
+
+/// The values of a model that were asked for, or that it has.
+fn values(
     model: &Model,
-    beside: u64,
+    wanted: Option<By>,
+    room: &mut Room,
     context: &Context<'_>,
-) -> Result<(Evaluator, Vec<String>)> {
-    let [views, lights] = model.directions()?;
-    let [view_triangles, light_triangles] = model.triangles()?;
-    let clusters = of_stage(model, Stage::Cluster, Model::clusters)?;
-    let bytes = ClusterTable::bytes([clusters, views.len(), lights.len()]);
-    let what = format!("the values of {}", counted(clusters, "cluster"));
-    context.require(&what, bytes.saturating_add(beside + (32 << 20) + PIECE_BYTES))?;
-    let mut table = ClusterTable::new(views.len(), lights.len());
-    for part in model.representative_chunks()? {
-        context.check_stop()?;
-        let representatives = model.representatives_of(part)?;
-        table.push(&representatives.samples, &representatives.decoder()?);
-    }
+) -> Result<(TileValues, Vec<String>)> {
+    let by = wanted.map_or_else(|| By::of(model), Ok)?;
     let mut notes = Vec::new();
-    if table.not_finite() > 0 {
-        notes.push(format!(
-            "{} of the model are no finite numbers and count as 0",
-            counted(table.not_finite(), "value")
-        ));
+    if wanted.is_none() && by == By::Components {
+        notes.push("the model has no clusters: values are those of its components".to_owned());
     }
-    for (name, list) in [("view", &views), ("light", &lights)] {
-        if list.len() < 3 {
-            notes.push(format!(
-                "the model has {}: it looks the same from everywhere",
-                counted(list.len(), &format!("{name} direction"))
-            ));
-        }
+    let values = TileValues::of_model(model, by, context)?;
+    values.take(SPARE_BYTES, room)?;
+    Ok((values, notes))
+}
+
+/// Checks that all entries of a texture have values.
+fn expect_within(entries: &[u32], count: usize) -> Result<()> {
+    match entries.iter().all(|&entry| (entry as usize) < count) {
+        true => Ok(()),
+        false => Err(beyond(entries, count)),
     }
-    Ok((Evaluator::new((&views, &view_triangles), (&lights, &light_triangles), table), notes))
+}
+
+/// A texture that is made piece by piece, of which a quarter of what is left is kept.
+pub(super) fn pieces(make: Maker, bounds: Option<(Size, bool)>, room: &Room) -> Texture {
+    Texture::Pieces(Pieces::new(make, bounds, room.left() / 4))
 }
 
 /// The tile of a model; `wraps` is asked for, or as it is.
-pub(super) fn tile(model: &Model, wraps: Option<bool>) -> Result<(Texture, Option<(Size, bool)>)> {
-    let tile = model.tile()?;
-    let index = of_stage(model, Stage::Cluster, Model::index)?;
-    let (size, wraps) = (tile.size, wraps.unwrap_or(tile.wraps));
-    Ok((Texture::Whole { size, wraps, index }, Some((size, wraps))))
+pub(super) fn tile(
+    values: &TileValues,
+    wraps: Option<bool>,
+    room: &Room,
+) -> Result<(Texture, Option<(Size, bool)>)> {
+    let (size, wraps) = (values.size(), wraps.unwrap_or(values.wraps()));
+    room.require(&format!("a tile of {size}"), INDEX_BYTES * size.texels() as u64)?;
+    Ok((Texture::Whole { size, wraps, index: values.entries()? }, Some((size, wraps))))
 }
 
 /// The endless plane of a model.
-pub(super) fn endless(model: &Model, which: PlaneOptions, context: &Context<'_>) -> Result<Texture> {
+pub(super) fn endless(
+    model: &Model,
+    values: &TileValues,
+    which: PlaneOptions,
+    room: &Room,
+    context: &Context<'_>,
+) -> Result<Texture> {
     let size = model.tile()?.size;
     let appearance = of_stage(model, Stage::Appearance, Model::appearance)?;
     let index = of_stage(model, Stage::Cluster, Model::index)?;
@@ -120,10 +171,12 @@ pub(super) fn endless(model: &Model, which: PlaneOptions, context: &Context<'_>)
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
-    context.require("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
+    let mut room = *room;
+    room.take("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
+    let entries = values.entries()?;
     let make: Maker = Box::new(move |area: Area| {
         let sources = plane.window(&variation, area.y, area.x, area.size)?;
-        Ok(sources.into_iter().map(|texel| index[texel as usize]).collect())
+        Ok(sources.into_iter().map(|texel| entries[texel as usize]).collect())
     });
-    Ok(Texture::Pieces(Pieces::new(make, None, context.work_bytes() / 4)))
+    Ok(pieces(make, None, &room))
 }

@@ -13,14 +13,17 @@ use crate::error::{Error, Result};
 use crate::picture::{Encoding, Picture, stream};
 use crate::render::camera::Camera;
 use crate::render::light::{Light, Place};
+use crate::render::surface::Surface;
 use crate::render::{Background, Environment, Scene};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
+use crate::stage::values::By;
 use crate::store::{kind_of, model};
-use crate::vector::Vector;
+use crate::vector::{Vector, length};
 use crate::words::counted;
 
 pub use sheets::compare;
@@ -91,12 +94,14 @@ pub enum Motion {
 /// What to show, on what, and how.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// A model (its tile, repeated if its borders join), or an enlarged index.
+    /// A model (its tile, repeated if its borders join), an enlarged index, or a packed model.
     pub source: PathBuf,
     /// The model of an enlarged index, where it is not found by itself.
     pub model: Option<PathBuf>,
     /// Of a model: the endless plane that the coherent rule makes of it.
     pub plane: Option<PlaneOptions>,
+    /// Whose values: those of the clusters where absent, or of the components of a model that has no clusters.
+    pub values: Option<By>,
     /// The object.
     pub shape: Shape,
     /// Size of the picture.
@@ -132,6 +137,7 @@ impl Options {
             source: source.into(),
             model: None,
             plane: None,
+            values: None,
             shape: Shape::Sphere,
             size: Size::new(512, 512),
             samples: None,
@@ -168,29 +174,24 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     let Options { size, .. } = *options;
     encoding.check_size(size)?;
     let picture = size.texels() as u64 * PIXEL_BYTES + encoding.memory_bytes(size);
-    context.require(&format!("a picture of {size}"), picture)?;
-    let material = material::open(options, picture, context)?;
-    let object = objects::object(options, material.bounds, context)?;
-    let camera = Camera::new(objects::view(options, &object), size)?;
-    let (lights, environment) = lights(options)?;
+    let mut room = Room::new(context.memory());
+    room.take(&format!("a picture of {size}"), picture)?;
+    let surface = objects::surface(options, &mut room, context)?;
+    let (lights, environment) = lights(options, &surface, &mut room)?;
+    // Last, since what is left of the memory keeps pieces of an endless texture.
+    let material = material::open(options, &mut room, context)?;
+    let laid = objects::laid(options, &surface, material.bounds);
+    let camera = Camera::new(objects::view(options, &surface), size)?;
     let background = match (environment, &options.environment) {
         (Some(environment), Some(chosen)) if chosen.seen => Background::Environment(environment),
         _ => Background::Grey(options.background),
     };
-    let (density, origin) = (object.density, object.origin);
     let shadows = options.shadows;
-    let mut scene = Scene {
-        surface: object.surface,
-        lights: lights.clone(),
-        background,
-        shadows,
-        density,
-        origin,
-        turn_rad: 0.0,
-    };
+    let objects::Laid { density, origin, samples } = laid;
+    let mut scene =
+        Scene { surface, lights: lights.clone(), background, shadows, density, origin, turn_rad: 0.0 };
     let count = options.frames.map_or(1, |(count, _)| count);
     let numbers: Vec<u32> = (0..count).filter(|&number| options.shard.has(number as usize)).collect();
-    let samples = options.samples.unwrap_or(object.samples);
     let mut report = Report { pictures: Vec::new(), size, notes: material.notes.clone() };
     let mut beyond = false;
     context.progress.begin("render", (numbers.len() * size.height) as u64, Counted::Items("rows"));
@@ -222,19 +223,22 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     }
     context.progress.end();
     if beyond {
-        let (size, _) = material.bounds.unwrap_or((Size::new(0, 0), false));
-        let is_model = kind_of(&options.source).is_ok_and(|kind| kind == model::KIND);
-        let more = if is_model {
-            "choose a larger --scale, or --plane for a surface that never ends"
-        } else {
-            "choose a larger --scale, or make a larger enlargement"
-        };
-        report.notes.push(format!(
-            "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; \
-             {more}"
-        ));
+        report.notes.push(beyond_note(options, material.bounds));
     }
     Ok(report)
+}
+
+/// What is told where an object shows more than a texture has.
+fn beyond_note(options: &Options, bounds: Option<(Size, bool)>) -> String {
+    let (size, _) = bounds.unwrap_or((Size::new(0, 0), false));
+    let more = match kind_of(&options.source) {
+        Ok(model::KIND) => "choose a larger --scale, or --plane for a surface that never ends",
+        Ok(_) => "choose a larger --scale, or make a larger enlargement",
+        Err(_) => "choose a larger --scale",
+    };
+    format!(
+        "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; {more}"
+    )
 }
 
 /// Writes a picture, its linear values times an exposure.
@@ -256,12 +260,29 @@ pub(super) fn write(
 }
 
 /// All lights, and the environment that some of them stand for.
-pub(super) fn lights(options: &Options) -> Result<(Vec<Light>, Option<Environment>)> {
+fn lights(
+    options: &Options,
+    surface: &Surface,
+    room: &mut Room,
+) -> Result<(Vec<Light>, Option<Environment>)> {
     let mut lights: Vec<Light> = options.lights.iter().map(|&direction| Light::far(direction)).collect();
-    lights.extend(options.points.iter().map(|&point| Light::at(point)));
+    for &point in &options.points {
+        let told = |what: &str| {
+            let [x, y, z] = point;
+            Error::usage(format!("a light at the point {x},{y},{z}, {what}"))
+                .hint("choose a point outside of the object, whose radius is 1: --point-light 1,1,2")
+        };
+        if length(point) == 0.0 {
+            return Err(told("the origin, where its brightness is measured"));
+        }
+        if surface.holds(point) {
+            return Err(told("which lies within the object or on it: it would light nothing"));
+        }
+        lights.push(Light::at(point));
+    }
     let Some(chosen) = &options.environment else { return Ok((lights, None)) };
     let bytes = objects::bytes_of(&chosen.path)?;
-    let environment = Environment::read(bytes.as_ref(), chosen.turn_deg)
+    let environment = Environment::read(bytes.as_ref(), chosen.turn_deg, room)
         .map_err(|error| error.context(chosen.path.display()))?;
     let around = environment.lights(chosen.lights);
     if around.is_empty() {
@@ -284,9 +305,11 @@ fn swept(light: &Light, radians: f64) -> Light {
 /// `turn.png` with the number of a picture, from 1: `turn-007.png`, as many digits as the last one has.
 fn numbered(output: &Path, number: u32, count: u32) -> PathBuf {
     let digits = count.to_string().len();
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    let ending = output.extension().unwrap_or_default().to_string_lossy();
-    output.with_file_name(format!("{stem}-{:0digits$}.{ending}", number + 1))
+    // Names are bytes: two that are not UTF-8 must not become the same.
+    let mut name = output.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{:0digits$}.", number + 1));
+    name.push(output.extension().unwrap_or_default());
+    output.with_file_name(name)
 }
 
 /// What is told of a run.

@@ -34,6 +34,7 @@ pub use stages::Stage;
 pub const KIND: &str = "model";
 
 /// A model store.
+#[derive(Clone)]
 pub struct Model {
     store: Store,
 }

@@ -7,13 +7,12 @@ use std::io::Write;
 use btfkit_formats::bonn::{self, ColorModel, Scalar, Writer};
 use btfkit_formats::{SampleType, Samples};
 
-use super::{Options, Written, for_each_view, linear};
+use super::{Options, Source, Written, for_each_view, linear};
 use crate::disk::output;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::{Counted, Stage};
 use crate::shape::Window;
-use crate::store::measurement::Measurement;
 use crate::words::counted;
 use factor::{Block, Factors, Identity, Size, identity_rows};
 
@@ -24,14 +23,14 @@ const BAND_LIMIT_BYTES: usize = 256 << 20;
 const BAND_ROWS: usize = 16;
 
 /// One factorisation a channel.
-pub(super) fn dfmf(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
-    let description = describe(measurement);
-    let scalar = scalar(measurement);
+pub(super) fn dfmf(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
+    let description = describe(source);
+    let scalar = scalar(source);
     let channels = description.channels.len();
-    let size = matrix_size(measurement, 1);
+    let size = matrix_size(source, 1);
     let factors: Option<Vec<Factors>> = options
         .rank
-        .map(|rank| (0..channels).map(|c| truncated(measurement, Part::Channel(c), rank, context)).collect())
+        .map(|rank| (0..channels).map(|c| truncated(source, Part::Channel(c), rank, context)).collect())
         .transpose()?;
     let values = match &factors {
         Some(factors) => factors.iter().map(|factors| factors.singular_values.clone()).collect(),
@@ -42,8 +41,9 @@ pub(super) fn dfmf(measurement: &Measurement, options: &Options, context: &Conte
         let mut writer = Writer::dfmf(output, &description, scalar, &ColorModel::Rgb, &values)?;
         match &factors {
             Some(factors) => factors.iter().try_for_each(|factors| push(&mut writer, factors))?,
-            None => (0..channels)
-                .try_for_each(|c| push_exact(&mut writer, measurement, Part::Channel(c), context))?,
+            None => {
+                (0..channels).try_for_each(|c| push_exact(&mut writer, source, Part::Channel(c), context))?
+            }
         }
         writer.finish()?;
         Ok(())
@@ -52,17 +52,17 @@ pub(super) fn dfmf(measurement: &Measurement, options: &Options, context: &Conte
 }
 
 /// One factorisation of all channels.
-pub(super) fn fmf(measurement: &Measurement, options: &Options, context: &Context<'_>) -> Result<Written> {
-    let description = describe(measurement);
-    let scalar = scalar(measurement);
-    let size = matrix_size(measurement, description.channels.len());
-    let factors = options.rank.map(|rank| truncated(measurement, Part::All, rank, context)).transpose()?;
+pub(super) fn fmf(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
+    let description = describe(source);
+    let scalar = scalar(source);
+    let size = matrix_size(source, description.channels.len());
+    let factors = options.rank.map(|rank| truncated(source, Part::All, rank, context)).transpose()?;
     let values = factors.as_ref().map_or(vec![1.0; size.full_rank()], |f| f.singular_values.clone());
     let made = output::write_whole(&options.output, context.existing, |output| {
         let mut writer = Writer::fmf(output, &description, scalar, &values, false)?;
         match &factors {
             Some(factors) => push(&mut writer, factors)?,
-            None => push_exact(&mut writer, measurement, Part::All, context)?,
+            None => push_exact(&mut writer, source, Part::All, context)?,
         }
         writer.finish()?;
         Ok(())
@@ -99,8 +99,8 @@ impl Part {
     }
 }
 
-fn describe(measurement: &Measurement) -> bonn::Description {
-    let description = measurement.description();
+fn describe(source: &Source) -> bonn::Description {
+    let description = source.description();
     bonn::Description {
         measurement_setup: String::new(),
         image_sensor: String::new(),
@@ -116,16 +116,16 @@ fn describe(measurement: &Measurement) -> bonn::Description {
 }
 
 /// Halves hold what halves or 8 bits held; anything else needs floats.
-fn scalar(measurement: &Measurement) -> Scalar {
-    match measurement.description().sample_type {
+fn scalar(source: &Source) -> Scalar {
+    match source.description().sample_type {
         SampleType::U8 | SampleType::F16 => Scalar::F16,
         SampleType::U16 | SampleType::F32 => Scalar::F32,
     }
 }
 
 /// Rows are (view * lights + light) * channels + channel, columns pixels.
-fn matrix_size(measurement: &Measurement, channels: usize) -> Size {
-    let description = measurement.description();
+fn matrix_size(source: &Source, channels: usize) -> Size {
+    let description = source.description();
     Size {
         rows: description.views.len() * description.lights.len() * channels,
         columns: description.size.texels(),
@@ -140,22 +140,22 @@ fn push<W: Write>(writer: &mut Writer<W>, factors: &Factors) -> Result<()> {
 /// The identity and the matrix, row by row of both.
 fn push_exact<W: Write>(
     writer: &mut Writer<W>,
-    measurement: &Measurement,
+    source: &Source,
     part: Part,
     context: &Context<'_>,
 ) -> Result<()> {
-    let all = measurement.description().n_channels();
-    let size = matrix_size(measurement, part.channels(all).len());
+    let all = source.description().n_channels();
+    let size = matrix_size(source, part.channels(all).len());
     let identity = || identity_rows(size.full_rank());
     match Identity::of(size) {
         Identity::Directions => {
             identity().try_for_each(|row| writer.push(&row))?;
-            push_by_pixel(writer, measurement, part, context)
+            push_by_pixel(writer, source, part, context)
         }
         Identity::Pixels => {
-            for_each_view(measurement, context, |_, images| {
-                let images = linear(&images, measurement.description().transfer);
-                rows_of_view(measurement, part, &images).try_for_each(|row| Ok(writer.push(&row)?))
+            for_each_view(source, context, |_, images| {
+                let images = linear(&images, source.description().transfer);
+                rows_of_view(source, part, &images).try_for_each(|row| Ok(writer.push(&row)?))
             })?;
             identity().try_for_each(|row| Ok(writer.push(&row)?))
         }
@@ -165,11 +165,11 @@ fn push_exact<W: Write>(
 /// Columns of the matrix one after another: all directions of each pixel.
 fn push_by_pixel<W: Write>(
     writer: &mut Writer<W>,
-    measurement: &Measurement,
+    source: &Source,
     part: Part,
     context: &Context<'_>,
 ) -> Result<()> {
-    let description = measurement.description();
+    let description = source.description();
     let (size, texel, all) = (description.size, description.texel_samples(), description.n_channels());
     let row_bytes = size.width * description.views.len() * description.texel_bytes();
     let rows = (BAND_LIMIT_BYTES / row_bytes.max(1)).clamp(1, BAND_ROWS);
@@ -179,7 +179,7 @@ fn push_by_pixel<W: Write>(
         let height = rows.min(size.height - y);
         let window = Window { y, x: 0, size: crate::shape::Size::new(height, size.width) };
         let views: Vec<Samples> = (0..description.views.len())
-            .map(|view| Ok(linear(&measurement.read_reflectance(view, window)?, description.transfer)))
+            .map(|view| Ok(linear(&source.read_reflectance(view, window)?, description.transfer)))
             .collect::<Result<_>>()?;
         let mut pixel = Vec::new();
         for at in 0..window.size.texels() {
@@ -199,12 +199,12 @@ fn push_by_pixel<W: Write>(
 
 /// Rows of the matrix that one view's linear images give.
 fn rows_of_view<'a>(
-    measurement: &Measurement,
+    source: &Source,
     part: Part,
     images: &'a Samples,
 ) -> impl Iterator<Item = Vec<f64>> + use<'a> {
-    let (lights, all) = (measurement.description().lights.len(), measurement.description().n_channels());
-    let pixels = measurement.description().size.texels();
+    let (lights, all) = (source.description().lights.len(), source.description().n_channels());
+    let pixels = source.description().size.texels();
     (0..lights).flat_map(move |light| {
         part.channels(all).map(move |c| {
             let at = |pixel: usize| (light * pixels + pixel) * all + c;
@@ -213,10 +213,10 @@ fn rows_of_view<'a>(
     })
 }
 
-fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Context<'_>) -> Result<Factors> {
-    let description = measurement.description();
+fn truncated(source: &Source, part: Part, rank: usize, context: &Context<'_>) -> Result<Factors> {
+    let description = source.description();
     let part_channels = part.channels(description.n_channels()).len();
-    let size = matrix_size(measurement, part_channels);
+    let size = matrix_size(source, part_channels);
     if rank > size.full_rank() {
         return Err(Error::usage(format!("got --rank {rank}, the rank is at most {}", size.full_rank())));
     }
@@ -234,10 +234,9 @@ fn truncated(measurement: &Measurement, part: Part, rank: usize, context: &Conte
         }
         number += 1;
         context.progress.stage(Some(Stage { number, of, name: "factorise" }));
-        for_each_view(measurement, context, |view, images| {
+        for_each_view(source, context, |view, images| {
             let images = linear(&images, description.transfer);
-            let values: Vec<f32> =
-                rows_of_view(measurement, part, &images).flatten().map(|v| v as f32).collect();
+            let values: Vec<f32> = rows_of_view(source, part, &images).flatten().map(|v| v as f32).collect();
             visit(Block { rows: view * rows..(view + 1) * rows, columns: 0..size.columns, values: &values })
         })?;
         // What follows a pass takes long with many columns, and counts nothing.

@@ -31,8 +31,8 @@ impl Model {
                 stage.name()
             ))
             .hint(format!(
-                "btf image {path} --out NAME.png shows it; for more, make a model of the measurement: btf model \
-                 MEASUREMENT NAME.model.zarr"
+                "btf image {path} --out NAME.png shows it; for more, make a model of the measurement, or of the packed file \
+                 imported as one: btf model MEASUREMENT NAME.model.zarr"
             ));
         }
         Error::missing(format!("{path}: stage {} has not been run", stage.name()))

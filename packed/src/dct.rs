@@ -152,8 +152,12 @@ impl Axis {
 /// Each row becomes the sum of all rows, each times its weight there.
 fn weighted(rows: &mut [f64], spare: &mut [f64], width: usize, weight: impl Fn(usize, usize) -> f64) {
     spare.fill(0.0);
+    // Of a spectrum most rows are nothing but zeros, which add nothing.
+    let is_some = |row: &&[f64]| row.iter().any(|&value| value != 0.0);
+    let given: Vec<(usize, &[f64])> =
+        rows.chunks_exact(width).enumerate().filter(|(_, row)| is_some(row)).collect();
     for (at, to) in spare.chunks_exact_mut(width).enumerate() {
-        for (number, from) in rows.chunks_exact(width).enumerate() {
+        for &(number, from) in &given {
             let weight = weight(at, number);
             to.iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
         }

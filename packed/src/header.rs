@@ -21,6 +21,9 @@ pub const MOST_DIRECTIONS: usize = 1024;
 /// Most channels.
 const MOST_CHANNELS: usize = 256;
 
+/// The largest step: no number that may be read is larger.
+const MOST_STEP: f32 = (1u128 << 64) as f32;
+
 /// Numbers that a file of no length may stand for, and that each of its bytes adds.
 const NUMBERS: [usize; 2] = [1 << 22, 1 << 12];
 
@@ -46,15 +49,20 @@ pub(crate) struct Header {
 /// Whether a file of so many bytes may stand for a mean and so many components.
 ///
 /// # Errors
-/// Where it would be more numbers than such a file can reasonably mean.
+/// Where it would be more numbers than such a file can reasonably mean, or more components than are independent.
 pub(crate) fn expect_numbers(brdf: usize, texels: usize, components: usize, bytes: usize) -> Result<()> {
+    let independent = brdf.min(texels);
+    if components > independent {
+        let expected = format!("at most {independent}, as many as there are texels, or values of one");
+        return Err(Error::new(format!("{components} components"), expected));
+    }
     let numbers = brdf.saturating_add(components.saturating_mul(brdf.saturating_add(texels)));
     let most = NUMBERS[0] + NUMBERS[1].saturating_mul(bytes);
     if numbers <= most {
         return Ok(());
     }
     Err(Error::new(
-        format!("{components} components of {numbers} numbers together in a file of {bytes} bytes"),
+        format!("{components} components, {numbers} numbers together, in a file of {bytes} bytes"),
         format!("at most {most} numbers"),
     ))
 }
@@ -175,8 +183,9 @@ impl Header {
             )
             .at(8));
         }
-        if !(step.is_finite() && step > 0.0) {
-            return Err(Error::new(format!("a step of {step}"), "a number above 0").at(14));
+        if !(step > 0.0 && step <= MOST_STEP) {
+            let expected = format!("a number above 0, of at most {MOST_STEP:e}");
+            return Err(Error::new(format!("a step of {step:e}"), expected).at(14));
         }
         let brdf = views.len() * lights.len() * channels;
         // A palette has a number for each texel even without components.

@@ -44,7 +44,7 @@ mod spectrum;
 mod stream;
 mod turn;
 
-pub use decode::{Ending, SectionEnd, Unpacked, unpack};
+pub use decode::{Ending, Outline, SectionEnd, Unpacked, outline, unpack};
 pub use encode::Packed;
 pub use error::{Error, Result};
 pub use header::{MAGIC, MOST_DIRECTIONS, MOST_SIDE};

@@ -2,6 +2,11 @@
 
 use crate::error::{Error, Result};
 
+/// The largest numbers that are read or written: of a mean and of coefficients, and of bases. Values that are sums of
+/// their products stay finite in 32 bits.
+const LARGEST: f64 = (1u128 << 64) as f64;
+const LARGEST_OF_BASIS: f64 = (1u64 << 32) as f64;
+
 /// A direction in degrees: polar angle from the normal, and azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
@@ -52,7 +57,7 @@ impl Model {
         self.views.len() * self.lights.len() * self.channels.len()
     }
 
-    /// Checks that the lengths fit together and that all numbers are finite.
+    /// Checks that the lengths fit together and that all numbers are finite and of a size that values can be made of.
     ///
     /// # Errors
     /// Says which does not.
@@ -66,10 +71,18 @@ impl Model {
             expect("a component's basis", basis.len(), self.brdf())?;
             expect("a component's coefficients", coefficients.len(), self.texels())?;
         }
-        let parts = self.components.iter().flat_map(|part| [&part.basis, &part.coefficients]);
-        match parts.chain([&self.mean]).flatten().find(|value| !value.is_finite()) {
-            None => Ok(()),
-            Some(value) => Err(Error::new(format!("the value {value}"), "finite numbers")),
+        let within =
+            |what: &str, list: &[f64], most: f64| match list.iter().find(|value| !(value.abs() <= most)) {
+                None => Ok(()),
+                Some(value) => {
+                    let expected = format!("finite numbers, of at most {most:e}");
+                    Err(Error::new(format!("the value {value:e} of {what}"), expected))
+                }
+            };
+        for Component { basis, coefficients } in &self.components {
+            within("a basis", basis, LARGEST_OF_BASIS)?;
+            within("coefficients", coefficients, LARGEST)?;
         }
+        within("the mean", &self.mean, LARGEST)
     }
 }

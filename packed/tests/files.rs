@@ -1,7 +1,7 @@
 //! Whole files: what comes back, and what does not.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use btfkit_packed::{Component, Direction, Ending, Model, Target, pack, unpack};
+use btfkit_packed::{Component, Direction, Ending, Model, Target, outline, pack, unpack};
 
 /// A model with smooth parts, noise, and directions on rings or anywhere.
 fn model(size: [usize; 2], counts: [usize; 3], components: usize) -> Model {
@@ -218,6 +218,66 @@ fn spoil(model: &Model, bytes: usize, least: usize) {
         }
     }
     assert!(read > least, "{read}");
+}
+
+#[test]
+fn numbers_that_no_values_can_be_made_of_are_refused_by_whoever_meets_them_first() {
+    let given = model([8, 8], [5, 5, 3], 3);
+    let packed = pack(&given, Some(0.0), Target::Bytes(700)).unwrap();
+    let forged = |at: usize, with: &[u8]| {
+        let mut bytes = packed.bytes.clone();
+        bytes[at..at + with.len()].copy_from_slice(with);
+        with_checksums(bytes)
+    };
+    // The step lies at byte 14: beyond all numbers, and so large that what it makes of them is.
+    for (step, told) in
+        [(f32::MAX, "byte 14: found a step of 3.4"), (f32::INFINITY, "a step of inf"), (0.0, "a step of 0")]
+    {
+        let file = forged(14, &step.to_le_bytes());
+        assert!(unpack(&file).unwrap_err().to_string().contains(told), "{:?}", unpack(&file));
+        assert!(outline(&file).unwrap_err().to_string().contains(told));
+    }
+    let file = forged(14, &(1e19f32).to_le_bytes());
+    let error = unpack(&file).unwrap_err().to_string();
+    assert!(error.contains("expected finite numbers, of at most 1.8"), "{error}");
+    // Components of the first section, behind the header and the length of the section.
+    let header = 22 + u32::from_le_bytes(packed.bytes[18..22].try_into().unwrap()) as usize + 4;
+    for count in [65u16, 65535] {
+        let bytes = packed.bytes[..header + 4].to_vec();
+        let bytes =
+            [&bytes[..], &count.to_le_bytes(), &[0; 2], &vec![0; 2 * usize::from(count) + 4]].concat();
+        let mut bytes = bytes;
+        bytes[header..header + 4].fill(0);
+        let file = with_checksums(bytes);
+        let told = format!("found {count} components, expected at most 64");
+        assert!(unpack(&file).unwrap_err().to_string().contains(&told), "{:?}", unpack(&file));
+        assert!(outline(&file).unwrap_err().to_string().contains(&told));
+    }
+    let mut large = given.clone();
+    large.mean[7] = 1e20;
+    assert!(
+        pack(&large, Some(0.0), Target::Bytes(999)).unwrap_err().to_string().contains("1e20 of the mean")
+    );
+}
+
+#[test]
+fn an_outline_says_what_unpacking_gives_and_takes() {
+    for (size, counts, components) in
+        [([16, 24], [9, 13, 3], 5), ([1, 300], [2, 400, 1], 3), ([97, 89], [4, 4, 1], 2)]
+    {
+        let packed = pack(&model(size, counts, components), Some(0.0), Target::Bytes(4000)).unwrap();
+        let (outline, found) = (outline(&packed.bytes).unwrap(), unpack(&packed.bytes).unwrap());
+        let model = &found.model;
+        assert_eq!((outline.size, outline.wraps, &outline.texts), (model.size, model.wraps, &model.texts));
+        assert_eq!(
+            (&outline.views, &outline.lights, &outline.channels),
+            (&model.views, &model.lights, &model.channels)
+        );
+        assert_eq!((outline.planes.clone(), outline.ending), (found.planes.clone(), found.ending));
+        assert_eq!(outline.components(), model.components.len());
+        let numbers = (model.components.len() + 1) * (model.brdf() + model.texels());
+        assert!(outline.memory_bytes() as usize >= packed.bytes.len() + 20 * numbers);
+    }
 }
 
 #[test]

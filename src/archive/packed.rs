@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use btfkit_formats::{Contents, Samples};
 
 use super::{Source, digest_of};
 use crate::color::Transfer;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::store::measurement::gather::images_of_texels;
 use crate::store::packed::{Packed, PackedFile};
@@ -18,8 +19,12 @@ const GROUPS: usize = 8;
 /// A packed model.
 pub(super) struct PackedArchive {
     path: PathBuf,
-    packed: Packed,
     contents: Contents,
+    notes: Vec<String>,
+    memory_bytes: u64,
+    digest: String,
+    /// Decoded when the first image is asked for: then its memory has been asked for, too.
+    packed: Mutex<Option<Arc<Packed>>>,
 }
 
 impl PackedArchive {
@@ -28,10 +33,9 @@ impl PackedArchive {
     /// # Errors
     /// A file that is none, or is damaged before its first plane ends.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let file = PackedFile::read(path)?;
-        let format = format!("packed model, {} components", file.unpacked.model.components.len());
-        let packed = Packed::of(file)?;
-        let description = &packed.description;
+        let file = PackedFile::open(path)?;
+        let format = format!("packed model, {} components", file.outline.components());
+        let description = &file.description;
         let contents = Contents {
             format,
             width: description.size.width as u32,
@@ -43,9 +47,27 @@ impl PackedArchive {
             linear: description.transfer == Transfer::Linear,
             cosine_included: true,
             assumptions: vec![],
-            remarks: packed.texts.clone(),
+            remarks: file.outline.texts.clone(),
         };
-        Ok(Self { path: path.to_owned(), packed, contents })
+        let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
+        let (path, digest) = (path.to_owned(), file.digest);
+        Ok(Self { path, contents, notes, memory_bytes, digest, packed: Mutex::default() })
+    }
+
+    fn packed(&self) -> Result<Arc<Packed>> {
+        let mut kept = self.packed.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(packed) = &*kept {
+            return Ok(Arc::clone(packed));
+        }
+        let file = PackedFile::open(&self.path)?;
+        if file.digest != self.digest {
+            let what = "the file was changed while it was read";
+            return Err(Error::input(format!("{}: {what}", self.path.display())));
+        }
+        let model = file.decode()?;
+        let packed = Arc::new(Packed::of(file, model));
+        *kept = Some(Arc::clone(&packed));
+        Ok(packed)
     }
 }
 
@@ -63,11 +85,12 @@ impl Source for PackedArchive {
     }
 
     fn bytes_beside_image(&self) -> u64 {
-        self.packed.memory_bytes
+        self.memory_bytes
     }
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
-        let Packed { components, description, .. } = &self.packed;
+        let packed = self.packed()?;
+        let Packed { components, description, .. } = &*packed;
         let (sample_type, transfer) = (description.sample_type, description.transfer);
         let window = description.size.window();
         let texels = components.samples(view, lights.clone(), window, sample_type, transfer);
@@ -76,7 +99,7 @@ impl Source for PackedArchive {
 
     fn notes(&self) -> Vec<String> {
         let coarser = "samples are those that the packed model stands for: what it left out is lost";
-        [coarser.to_owned()].into_iter().chain(self.packed.notes.clone()).collect()
+        [coarser.to_owned()].into_iter().chain(self.notes.clone()).collect()
     }
 
     fn check(&self, context: &Context<'_>) -> Result<String> {

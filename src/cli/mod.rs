@@ -65,7 +65,7 @@ Examples:
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
 Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else is at the place of the result;
+Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else has the name of the result;
 66 input not there yet; 74 the system refuses to read or write; 75 stopped on request (run the same command again).
 The book is in docs/; docs/README.md says where to begin.";
 
@@ -101,7 +101,7 @@ struct Common {
     /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace results that exist, also those of other options. Without it, nothing that exists is ever replaced
+    /// Replace results that exist, also those made with other options. Without it, nothing that exists is ever replaced
     #[arg(long, global = true)]
     force: bool,
     /// Print nothing but errors
@@ -113,7 +113,7 @@ struct Common {
 enum ProgressStyle {
     /// Bars on a terminal; elsewhere a line every half minute.
     Auto,
-    /// One JSON object a line on standard error, for schedulers; errors too.
+    /// One JSON object per line on standard error, for schedulers; errors too.
     Json,
     /// Nothing.
     None,
@@ -169,7 +169,7 @@ pub(crate) fn run() -> ExitCode {
         let _ = signal_hook::flag::register_conditional_shutdown(signal, 75, Arc::clone(&stop));
         let _ = signal_hook::flag::register(signal, Arc::clone(&stop));
     }
-    explain_aborts(cli.common.progress == ProgressStyle::Json);
+    explain_ends(cli.common.progress == ProgressStyle::Json);
     // A file that grows beyond its limit is an error of writing, as others are, and no reason to end at once.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let progress: Box<dyn Progress> = match cli.common.progress {
@@ -234,23 +234,51 @@ fn stopped(goes_on: bool) -> Error {
     }
 }
 
-/// A failed allocation ends in an abort; what is left lies in temporary files and is swept. With an exit code of ours
-/// schedulers need not take it for a bug that leaves a core.
+/// A signal that ends the program where it stands, as an error of ours.
+struct End {
+    signal: i32,
+    exit_code: i32,
+    message: &'static str,
+    advice: &'static str,
+}
+
+/// A failed allocation ends in an abort. Pages of a mapped file that another process has cut, or whose disk fails, are
+/// not there when they are read. With an exit code of ours schedulers need not take either for a bug that leaves a core.
+const ENDS: [End; 2] = [
+    End {
+        signal: signal_hook::consts::SIGABRT,
+        exit_code: 1,
+        message: "ended early, most likely since the system gives no more memory",
+        advice: "raise its limit (ulimit -v, or that of the container), or choose fewer --threads or a smaller --memory",
+    },
+    End {
+        signal: signal_hook::consts::SIGBUS,
+        exit_code: 74,
+        message: "a file could not be read on: it was cut while it was read, or its disk failed",
+        advice: "see that nothing else writes to the files that were read, and run the command again: it goes on",
+    },
+];
+
+/// Tells how the program ends by [`ENDS`]; what is left lies in temporary files and is swept.
 #[allow(unsafe_code)]
-fn explain_aborts(json: bool) {
-    const TOLD: &str = "btf: ended early, most likely since the system gives no more memory\n  \
-        raise its limit (ulimit -v, or that of the container), or choose fewer --threads or a smaller --memory\n";
-    const TOLD_JSON: &str = "{\"event\":\"error\",\"exit_code\":1,\"message\":\"ended early, most likely since the \
-        system gives no more memory\",\"advice\":\"raise its limit (ulimit -v, or that of the container), or choose \
-        fewer --threads or a smaller --memory\"}\n";
-    let told = if json { TOLD_JSON } else { TOLD };
-    let explain = move || {
-        let _ = std::io::stderr().write_all(told.as_bytes());
-        signal_hook::low_level::exit(1);
-    };
-    // SAFETY: standard error has no buffer, so that nothing is allocated; whoever else holds it goes on and releases
-    // it.
-    let _ = unsafe { signal_hook::low_level::register(signal_hook::consts::SIGABRT, explain) };
+fn explain_ends(json: bool) {
+    for End { signal, exit_code, message, advice } in ENDS {
+        let told = if json {
+            let line = serde_json::json!({
+                "event": "error", "exit_code": exit_code, "message": message, "advice": advice,
+            });
+            format!("{line}\n")
+        } else {
+            format!("btf: {message}\n  {advice}\n")
+        };
+        let explain = move || {
+            let _ = std::io::stderr().write_all(told.as_bytes());
+            signal_hook::low_level::exit(exit_code);
+        };
+        // SAFETY: standard error has no buffer, so that nothing is allocated; whoever else holds it goes on and
+        // releases it.
+        let _ = unsafe { signal_hook::low_level::register(signal, explain) };
+    }
 }
 
 /// Time between two looks at whether a stop was asked for.

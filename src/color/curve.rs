@@ -88,12 +88,62 @@ impl Linear {
     }
 }
 
-fn on_curve(sample: f64, transfer: Transfer) -> f32 {
+/// Samples that the curve does not hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Unheld {
+    /// Beyond its largest value, in either direction.
+    pub(crate) beyond: u64,
+    /// No finite numbers: they are 0 on it.
+    pub(crate) not_finite: u64,
+}
+
+impl std::ops::AddAssign for Unheld {
+    fn add_assign(&mut self, other: Self) {
+        self.beyond += other.beyond;
+        self.not_finite += other.not_finite;
+    }
+}
+
+impl Curve {
+    /// How many of a run of samples the curve does not hold.
+    pub(crate) fn unheld(&self, samples: &Samples, range: Range<usize>) -> Unheld {
+        let mut unheld = Unheld::default();
+        let mut count = |sample: f64| {
+            if !sample.is_finite() {
+                unheld.not_finite += 1;
+            } else if exact(sample, self.transfer).abs() > f64::from(LARGEST) {
+                unheld.beyond += 1;
+            }
+        };
+        match samples {
+            Samples::U8(_) | Samples::U16(_) => {}
+            Samples::F16(list) => list[range].iter().for_each(|sample| count(sample.to_f64())),
+            Samples::F32(list) => list[range].iter().for_each(|&sample| count(f64::from(sample))),
+        }
+        unheld
+    }
+
+    /// The largest sample that the curve holds.
+    pub(crate) fn largest(&self) -> f64 {
+        let value = f64::from(LARGEST) / f64::from(WHITE);
+        match self.transfer {
+            Transfer::Srgb => value,
+            Transfer::Linear => srgb_decode(value),
+        }
+    }
+}
+
+/// A sample on the curve.
+fn exact(sample: f64, transfer: Transfer) -> f64 {
     let value = match transfer {
         Transfer::Srgb => sample,
         Transfer::Linear => Transfer::Srgb.encode(sample),
     };
-    let value = (f64::from(WHITE) * value) as f32;
+    f64::from(WHITE) * value
+}
+
+fn on_curve(sample: f64, transfer: Transfer) -> f32 {
+    let value = exact(sample, transfer) as f32;
     if value.is_finite() { value.clamp(-LARGEST, LARGEST) } else { 0.0 }
 }
 
@@ -162,5 +212,18 @@ mod tests {
         let given = Samples::F32(vec![f32::NAN, f32::INFINITY, 0.5, -3e30]);
         Curve::new(SampleType::F32, Transfer::Srgb).values(&given, 0..4, &mut values);
         assert_eq!(values, [0.0, 0.0, 127.5, -LARGEST]);
+        for transfer in [Transfer::Srgb, Transfer::Linear] {
+            let curve = Curve::new(SampleType::F32, transfer);
+            let most = curve.largest() as f32;
+            let given =
+                Samples::F32(vec![f32::NAN, f32::NEG_INFINITY, 0.999 * most, 1.001 * most, -3e30, 2.0]);
+            assert_eq!(curve.unheld(&given, 0..6), Unheld { beyond: 2, not_finite: 2 });
+            assert_eq!(curve.unheld(&given, 2..3), Unheld::default());
+        }
+        let halves = Samples::F16(vec![f16::MAX, f16::NAN, f16::MIN]);
+        for transfer in [Transfer::Srgb, Transfer::Linear] {
+            let found = Curve::new(SampleType::F16, transfer).unheld(&halves, 0..3);
+            assert_eq!(found, Unheld { beyond: 0, not_finite: 1 });
+        }
     }
 }

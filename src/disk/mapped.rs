@@ -64,9 +64,10 @@ impl MappedFile {
         if file.metadata()?.len() == 0 {
             return Ok(Self { map: None });
         }
-        // SAFETY: the map is only read. A file that another process truncates while it is mapped can end
-        // this process by SIGBUS; stores are replaced by rename and never truncated, and an archive that
-        // is cut short during its own import is beyond saving.
+        // SAFETY: the map is only read. Where another process truncates the file meanwhile, or its disk fails, the
+        // process gets SIGBUS; the program then ends with a message and exit code 74 (src/cli/mod.rs). Stores are
+        // replaced by rename and never truncated. Whoever reads an archive looks afterwards whether it is still the
+        // same, since behind the new end a page may hold zeros.
         let map = unsafe { memmap2::Mmap::map(&file)? };
         Ok(Self { map: Some(map) })
     }

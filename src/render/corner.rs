@@ -1,6 +1,8 @@
 //! Corners of triangles, as files of meshes have them.
 
-use crate::error::{Error, Result};
+use super::mesh::TRIANGLE_BYTES;
+use crate::error::Result;
+use crate::run::budget::Room;
 use crate::vector::Vector;
 use crate::words::counted;
 
@@ -17,15 +19,11 @@ pub struct Corner {
     pub tangent: Option<(Vector, f64)>,
 }
 
-/// Refuses more triangles than memory holds.
+/// Checks that there is room for a mesh of so many triangles, while they are read and with their tree.
 ///
 /// # Errors
-/// Where there are more.
-pub(super) fn expect_at_most(most: usize, triangles: usize) -> Result<()> {
-    if triangles <= most {
-        return Ok(());
-    }
-    let (got, most) = (counted(triangles, "triangle"), counted(most, "triangle"));
-    Err(Error::usage(format!("got {got} or more; memory is allowed for {most}"))
-        .hint("allow more with --memory, or simplify the mesh"))
+/// Where there is not.
+pub(super) fn expect_triangles(room: &Room, triangles: usize) -> Result<()> {
+    let bytes = (triangles as u64).saturating_mul(TRIANGLE_BYTES);
+    room.require(&format!("a mesh of {}", counted(triangles, "triangle")), bytes)
 }

@@ -8,8 +8,9 @@ use btfkit_formats::{Limits, Samples, picture};
 use super::light::{Light, Place};
 use crate::color::{Decoder, LUMINANCE_WEIGHTS, Transfer};
 use crate::error::{Error, Result};
+use crate::run::budget::Room;
 use crate::shape::Size;
-use crate::vector::{Vector, along, unit};
+use crate::vector::{Vector, along, length, unit};
 
 /// A latitude-longitude picture of what surrounds a scene: its middle lies behind the object, its left edge behind the
 /// default camera, its top row above.
@@ -20,6 +21,9 @@ pub struct Environment {
     turn_rad: f64,
 }
 
+/// Memory of a pixel: its colour, and the sum of light up to it.
+const PIXEL_BYTES: u64 = 12 + 8;
+
 /// Rows and columns of a part: from, and up to.
 #[derive(Clone, Copy)]
 struct Part {
@@ -28,11 +32,20 @@ struct Part {
 }
 
 impl Environment {
-    /// Reads a picture: OpenEXR or Radiance. `turn_deg` turns it about the vertical axis.
+    /// Reads a picture: OpenEXR or Radiance. `turn_deg` turns it about the vertical axis. What stays in memory is taken of
+    /// the room.
     ///
     /// # Errors
-    /// Bytes that are no such picture, and values that are not finite or are negative.
-    pub fn read(bytes: &[u8], turn_deg: f64) -> Result<Self> {
+    /// Bytes that are no such picture, values that are not finite or are negative, and a picture that there is no room
+    /// for.
+    pub fn read(bytes: &[u8], turn_deg: f64, room: &mut Room) -> Result<Self> {
+        let header =
+            picture::header(bytes, &Limits::default()).map_err(|error| Error::input(error.to_string()))?;
+        let count = u64::from(header.width).saturating_mul(u64::from(header.height));
+        // Its file, its samples as they are read and as they are sorted, and its pixels with the sums of their light.
+        let sample = (header.channels.len() * header.sample_type.bytes()) as u64;
+        let needed = count.saturating_mul(2 * sample + PIXEL_BYTES).saturating_add(bytes.len() as u64);
+        room.require(&format!("an environment of {} x {}", header.width, header.height), needed)?;
         let picture =
             picture::decode(bytes, &Limits::default()).map_err(|error| Error::input(error.to_string()))?;
         if !matches!(picture.samples, Samples::F16(_) | Samples::F32(_)) {
@@ -60,6 +73,8 @@ impl Environment {
                 pixels[at]
             )));
         }
+        drop(picture);
+        room.take("an environment", PIXEL_BYTES * size.texels() as u64)?;
         Ok(Self { size, pixels, turn_rad: turn_deg.to_radians() })
     }
 
@@ -145,18 +160,29 @@ impl Environment {
         halves(low)
     }
 
-    /// All light of a part from the middle of it. A light of 1 all around makes a perfect diffuser 1.
+    /// All light of a part from the middle of it, or from where it is brightest if its directions cancel each other. A
+    /// light of 1 all around makes a perfect diffuser 1.
     fn light_of(&self, part: Part) -> Option<Light> {
-        let (mut middle, mut color) = ([0.0; 3], [0.0f64; 3]);
+        /// Of a sum of directions, the share of the light that must be left for it to be a direction and no rounding.
+        const LEFT: f64 = 1e-6;
+        let (mut middle, mut color, mut sum) = ([0.0; 3], [0.0f64; 3], 0.0);
+        let mut brightest = (0.0, [0.0; 3]);
         for row in part.rows[0]..part.rows[1] {
             let angle = self.solid_angle(row);
             for column in part.columns[0]..part.columns[1] {
                 let pixel = self.pixels[row * self.size.width + column].map(f64::from);
                 let light = angle * (0..3).map(|c| LUMINANCE_WEIGHTS[c] * pixel[c]).sum::<f64>();
-                middle = along(middle, light, self.direction(row as f64 + 0.5, column as f64 + 0.5));
+                let direction = self.direction(row as f64 + 0.5, column as f64 + 0.5);
+                middle = along(middle, light, direction);
                 color = along(color, angle / std::f64::consts::PI, pixel);
+                sum += light;
+                if light > brightest.0 {
+                    brightest = (light, direction);
+                }
             }
         }
-        Some(Light { place: Place::Far(unit(middle)?), color })
+        let is_sure = length(middle) > LEFT * sum;
+        let direction = unit(if is_sure { middle } else { brightest.1 })?;
+        Some(Light { place: Place::Far(direction), color })
     }
 }

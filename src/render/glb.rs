@@ -7,9 +7,11 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 
-use super::corner::{Corner, expect_at_most};
+use super::corner::{Corner, expect_triangles};
 use crate::error::{Error, Result};
+use crate::run::budget::Room;
 use crate::vector::{Vector, cross};
+use crate::words::counted;
 
 /// Nodes within nodes, deeper than which a file is refused: it may hold itself.
 const DEEPEST: usize = 64;
@@ -17,21 +19,29 @@ const DEEPEST: usize = 64;
 /// A place or a direction as a row of four, times a matrix.
 type Matrix = [[f64; 4]; 4];
 
+/// What is asked of a mesh file.
 struct Reader<'a> {
     root: &'a json::Root,
     blob: &'a [u8],
-    triangles: Vec<[Corner; 3]>,
-    /// The most triangles that there may be.
-    most: usize,
-    /// Nodes that are still to be met: each hangs on one other at most.
-    nodes_left: usize,
+}
+
+/// The elements of an accessor, each decoded when it is asked for.
+struct Numbers<'a> {
+    data: &'a [u8],
+    count: usize,
+    stride: usize,
+    component: ComponentType,
+    /// Numbers of an element.
+    values: usize,
+    scale: f64,
 }
 
 /// All triangles of the default scene, or of the first.
 ///
 /// # Errors
-/// A file that cannot be read, that keeps its buffers elsewhere or packed, and triangles without texture coordinates.
-pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
+/// A file that cannot be read, that keeps its buffers elsewhere or packed, triangles without texture coordinates, and
+/// more than there is room for.
+pub(super) fn corners(bytes: &[u8], room: &mut Room) -> Result<Vec<[Corner; 3]>> {
     // Magic, version and length.
     if !bytes.starts_with(b"glTF")
         || bytes.len() < 20
@@ -44,21 +54,35 @@ pub(super) fn corners(bytes: &[u8], most: usize) -> Result<Vec<[Corner; 3]>> {
     let unreadable =
         |error: &dyn std::fmt::Display| Error::input(format!("no binary glTF that can be read: {error}"));
     let file = gltf::Glb::from_slice(bytes).map_err(|error| unreadable(&error))?;
+    room.take("the description of a mesh", description_bytes(&file.json))?;
     let root: json::Root = serde_json::from_slice(&file.json).map_err(|error| unreadable(&error))?;
-    let blob = file.bin.as_deref().unwrap_or_default();
-    let nodes_left = root.nodes.len();
-    let mut reader = Reader { root: &root, blob, triangles: Vec::new(), most, nodes_left };
-    let scene = match root.scene {
-        Some(number) => root.scenes.get(number.value()),
-        None => root.scenes.first(),
-    };
-    let scene = scene.ok_or_else(|| Error::input("a glTF without a scene"))?;
-    let identity =
-        std::array::from_fn(|row| std::array::from_fn(|column| f64::from(u8::from(row == column))));
-    for node in &scene.nodes {
-        reader.node(node.value(), &identity, 0)?;
-    }
-    Ok(reader.triangles)
+    let reader = Reader { root: &root, blob: file.bin.as_deref().unwrap_or_default() };
+    let (mut count, mut visited) = (0usize, 0usize);
+    reader.walk(&mut |primitive, _| {
+        count = count.saturating_add(reader.triangles(primitive)?);
+        // Those without a triangle are counted as one, so that no file keeps the program busy for ever.
+        visited += 1;
+        expect_triangles(room, count.max(visited))
+    })?;
+    let mut triangles = Vec::with_capacity(count);
+    reader.walk(&mut |primitive, matrix| reader.primitive(primitive, matrix, &mut triangles))?;
+    Ok(triangles)
+}
+
+/// The most memory that a description takes once it is read: that of its text, of so many objects as it has braces and
+/// so many numbers as it has commas, in lists that grow by doubling.
+fn description_bytes(text: &[u8]) -> u64 {
+    const OBJECTS: [usize; 6] = [
+        size_of::<Node>(),
+        size_of::<Primitive>(),
+        size_of::<json::Mesh>(),
+        size_of::<json::Material>(),
+        size_of::<json::Accessor>(),
+        size_of::<json::Animation>(),
+    ];
+    let object = OBJECTS.into_iter().fold(0, usize::max);
+    let count = |byte: u8| text.iter().filter(|&&found| found == byte).count();
+    (text.len() + 3 * (object * count(b'{') + 8 * count(b','))) as u64
 }
 
 /// One of a list, by its number.
@@ -88,64 +112,96 @@ fn matrix_of(node: &Node) -> Matrix {
     })
 }
 
-impl Reader<'_> {
-    fn node(&mut self, number: usize, above: &Matrix, depth: usize) -> Result<()> {
+impl<'a> Reader<'a> {
+    /// Visits the primitives of all meshes of the scene, with the place of each.
+    fn walk(&self, visit: &mut dyn FnMut(&Primitive, &Matrix) -> Result<()>) -> Result<()> {
+        let root = self.root;
+        let scene = match root.scene {
+            Some(number) => root.scenes.get(number.value()),
+            None => root.scenes.first(),
+        };
+        let scene = scene.ok_or_else(|| Error::input("a glTF without a scene"))?;
+        let identity =
+            std::array::from_fn(|row| std::array::from_fn(|column| f64::from(u8::from(row == column))));
+        // Each hangs on one other at most.
+        let mut left = root.nodes.len();
+        scene.nodes.iter().try_for_each(|node| self.node(node.value(), (&identity, 0), &mut left, visit))
+    }
+
+    fn node(
+        &self,
+        number: usize,
+        (above, depth): (&Matrix, usize),
+        left: &mut usize,
+        visit: &mut dyn FnMut(&Primitive, &Matrix) -> Result<()>,
+    ) -> Result<()> {
         if depth > DEEPEST {
             return Err(Error::input(format!("node {number}: more than {DEEPEST} nodes within each other")));
         }
-        let left = self.nodes_left.checked_sub(1);
-        self.nodes_left =
-            left.ok_or_else(|| Error::input(format!("node {number} hangs on more than one other")))?;
-        let root = self.root;
-        let node = one_of(&root.nodes, "node", number)?;
+        *left = left
+            .checked_sub(1)
+            .ok_or_else(|| Error::input(format!("node {number} hangs on more than one other")))?;
+        let node = one_of(&self.root.nodes, "node", number)?;
         let own = matrix_of(node);
         let matrix: Matrix = std::array::from_fn(|column| {
             std::array::from_fn(|row| (0..4).map(|n| above[n][row] * own[column][n]).sum())
         });
         if let Some(mesh) = node.mesh {
-            for (n, primitive) in one_of(&root.meshes, "mesh", mesh.value())?.primitives.iter().enumerate() {
-                let place = format!("mesh {}, primitive {n}", mesh.value());
-                self.primitive(primitive, &matrix).map_err(|error| error.context(place))?;
+            let mesh = mesh.value();
+            for (n, primitive) in one_of(&self.root.meshes, "mesh", mesh)?.primitives.iter().enumerate() {
+                visit(primitive, &matrix)
+                    .map_err(|error| error.context(format!("mesh {mesh}, primitive {n}")))?;
             }
         }
-        for child in node.children.iter().flatten() {
-            self.node(child.value(), &matrix, depth + 1)?;
-        }
-        Ok(())
+        let mut children = node.children.iter().flatten();
+        children.try_for_each(|child| self.node(child.value(), (&matrix, depth + 1), left, visit))
     }
 
-    fn primitive(&mut self, primitive: &Primitive, matrix: &Matrix) -> Result<()> {
-        let Checked::Valid(mode) = primitive.mode else {
-            return Err(Error::input("an unknown mode"));
+    /// How many triangles a primitive has.
+    fn triangles(&self, primitive: &Primitive) -> Result<usize> {
+        let corners = match primitive.indices {
+            Some(accessor) => Some(accessor),
+            None => primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied(),
         };
-        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-            return Ok(());
+        let corners = match corners {
+            Some(accessor) => one_of(&self.root.accessors, "accessor", accessor.value())?.count.0,
+            None => 0,
+        };
+        let corners = usize::try_from(corners).unwrap_or(usize::MAX);
+        match primitive.mode {
+            Checked::Valid(Mode::Triangles) => Ok(corners / 3),
+            Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => Ok(corners.saturating_sub(2)),
+            Checked::Valid(_) => Ok(0),
+            Checked::Invalid => Err(Error::input("an unknown mode")),
         }
-        let read = |semantic| {
-            let accessor = primitive.attributes.get(&Checked::Valid(semantic));
-            accessor.map(|accessor| self.numbers(accessor.value())).transpose()
+    }
+
+    fn primitive(
+        &self,
+        primitive: &Primitive,
+        matrix: &Matrix,
+        triangles: &mut Vec<[Corner; 3]>,
+    ) -> Result<()> {
+        let mode = match primitive.mode {
+            Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+            _ => return Ok(()),
         };
-        let places = read(Semantic::Positions)?.ok_or_else(|| Error::input("no positions"))?;
-        let textures = read(Semantic::TexCoords(0))?.ok_or_else(|| {
+        let read = |semantic, types| {
+            let accessor = primitive.attributes.get(&Checked::Valid(semantic));
+            accessor.map(|accessor| self.attribute(accessor.value(), types)).transpose()
+        };
+        let places = read(Semantic::Positions, Type::Vec3)?.ok_or_else(|| Error::input("no positions"))?;
+        let textures = read(Semantic::TexCoords(0), Type::Vec2)?.ok_or_else(|| {
             Error::input("no texture coordinates (TEXCOORD_0)")
                 .hint("unwrap it in a modelling program, and export it with texture coordinates")
         })?;
-        let (normals, tangents) = (read(Semantic::Normals)?, read(Semantic::Tangents)?);
-        let order: Vec<usize> = match primitive.indices {
-            Some(accessor) => self.numbers(accessor.value())?.iter().map(|value| value[0] as usize).collect(),
-            None => (0..places.len()).collect(),
+        let (normals, tangents) =
+            (read(Semantic::Normals, Type::Vec3)?, read(Semantic::Tangents, Type::Vec4)?);
+        let indices = primitive.indices.map(|accessor| self.indices(accessor.value())).transpose()?;
+        let vertex = |at: usize| match &indices {
+            Some(indices) => indices.get(at).map_or(usize::MAX, |[number, ..]| number as usize),
+            None => at,
         };
-        let triples: Vec<[usize; 3]> = match mode {
-            Mode::Triangles => order.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-            Mode::TriangleStrip => {
-                let turned = |(n, c): (usize, &[usize])| {
-                    if n % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] }
-                };
-                order.windows(3).enumerate().map(turned).collect()
-            }
-            _ => order.windows(2).skip(1).map(|c| [order[0], c[0], c[1]]).collect(),
-        };
-        expect_at_most(self.most, self.triangles.len() + triples.len())?;
         let columns: [Vector; 3] = std::array::from_fn(|column| [0, 1, 2].map(|row| matrix[column][row]));
         // Normals are turned by the inverse of the transpose, whatever its scale; a mirrored object turns them over.
         let cofactors =
@@ -155,31 +211,67 @@ impl Reader<'_> {
         };
         let turns_over = crate::vector::dot(columns[0], cofactors[0]) < 0.0;
         let corner = |at: usize| -> Option<Corner> {
-            let [s, t, ..] = *textures.get(at)?;
-            let place = times(&columns, *places.get(at)?);
+            let [s, t, ..] = textures.get(at)?;
+            let place = times(&columns, places.get(at)?);
             let tangent = tangents.as_ref().and_then(|list| list.get(at));
             Some(Corner {
                 place: std::array::from_fn(|row| place[row] + matrix[3][row]),
                 // Of glTF the second coordinate grows downwards.
                 texture: [s, 1.0 - t],
-                normal: normals.as_ref().and_then(|list| list.get(at)).map(|&normal| {
+                normal: normals.as_ref().and_then(|list| list.get(at)).map(|normal| {
                     let normal = times(&cofactors, normal);
                     if turns_over { normal.map(|value| -value) } else { normal }
                 }),
-                tangent: tangent.map(|&t| (times(&columns, t), if turns_over { -t[3] } else { t[3] })),
+                tangent: tangent.map(|t| (times(&columns, t), if turns_over { -t[3] } else { t[3] })),
             })
         };
-        for triple in triples {
+        for n in 0..self.triangles(primitive)? {
+            let triple = match mode {
+                Mode::Triangles => [3 * n, 3 * n + 1, 3 * n + 2],
+                Mode::TriangleStrip if n % 2 == 0 => [n, n + 1, n + 2],
+                Mode::TriangleStrip => [n + 1, n, n + 2],
+                _ => [0, n + 1, n + 2],
+            };
+            let triple = triple.map(vertex);
             let [Some(a), Some(b), Some(c)] = triple.map(corner) else {
                 return Err(Error::input(format!("a triangle of corners {triple:?}, which are not there")));
             };
-            self.triangles.push([a, b, c]);
+            triangles.push([a, b, c]);
         }
         Ok(())
     }
 
-    /// The elements of an accessor, up to four numbers each; whole numbers that stand for shares are from 0 to 1.
-    fn numbers(&self, number: usize) -> Result<Vec<[f64; 4]>> {
+    /// The values of an attribute; whole numbers that stand for shares are from 0 to 1.
+    fn attribute(&self, number: usize, expected: Type) -> Result<Numbers<'a>> {
+        let accessor = one_of(&self.root.accessors, "accessor", number)?;
+        let numbers = self.numbers(number)?;
+        // Whole numbers of 32 bits stand for indices alone (glTF 2.0, 3.6.2.2).
+        if accessor.type_ != Checked::Valid(expected) || numbers.component == ComponentType::U32 {
+            let (values, kind) = (numbers.values, numbers.component);
+            let found = format!("accessor {number}: got {} of {kind:?}", counted(values, "value"));
+            return Err(Error::input(format!("{found} for a vertex, expected {expected:?} of F32 or less")));
+        }
+        Ok(numbers)
+    }
+
+    /// Numbers of vertices.
+    fn indices(&self, number: usize) -> Result<Numbers<'a>> {
+        let accessor = one_of(&self.root.accessors, "accessor", number)?;
+        let numbers = self.numbers(number)?;
+        let is_whole =
+            matches!(numbers.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
+        if !is_whole || numbers.values != 1 || accessor.normalized {
+            let (values, kind) = (numbers.values, numbers.component);
+            let normalized = if accessor.normalized { ", normalized," } else { "" };
+            let found =
+                format!("accessor {number}: got {} of {kind:?}{normalized}", counted(values, "value"));
+            return Err(Error::input(format!("{found} for an index, expected one of U8, U16 or U32")));
+        }
+        Ok(numbers)
+    }
+
+    /// The elements of an accessor, up to four numbers each.
+    fn numbers(&self, number: usize) -> Result<Numbers<'a>> {
         let accessor = one_of(&self.root.accessors, "accessor", number)?;
         let place = |what: &str| Error::input(format!("accessor {number}: {what}"));
         if accessor.sparse.is_some() {
@@ -225,17 +317,6 @@ impl Reader<'_> {
             (Some(data), Some(needed)) if needed <= data.len() && stride >= bytes * values => data,
             _ => return Err(place("it does not lie within its buffer")),
         };
-        let number = |at: usize| -> f64 {
-            let byte = |n: usize| data[at + n];
-            match component {
-                ComponentType::F32 => f64::from(f32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
-                ComponentType::U32 => f64::from(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])),
-                ComponentType::U16 => f64::from(u16::from_le_bytes([byte(0), byte(1)])),
-                ComponentType::U8 => f64::from(byte(0)),
-                ComponentType::I16 => f64::from(i16::from_le_bytes([byte(0), byte(1)])),
-                ComponentType::I8 => f64::from(byte(0) as i8),
-            }
-        };
         let whole = match component {
             ComponentType::U8 => 255.0,
             ComponentType::U16 => 65535.0,
@@ -244,13 +325,31 @@ impl Reader<'_> {
             _ => 1.0,
         };
         let scale = if accessor.normalized { 1.0 / whole } else { 1.0 };
-        let element = |n: usize| {
-            let mut element = [0.0; 4];
-            for (k, value) in element.iter_mut().take(values).enumerate() {
-                *value = number(n * stride + k * bytes) * scale;
-            }
-            element
-        };
-        Ok((0..count).map(element).collect())
+        Ok(Numbers { data, count, stride, component, values, scale })
+    }
+}
+
+impl Numbers<'_> {
+    /// An element, if there are so many.
+    fn get(&self, at: usize) -> Option<[f64; 4]> {
+        if at >= self.count {
+            return None;
+        }
+        let mut element = [0.0; 4];
+        let size = self.component.size();
+        for (n, value) in element.iter_mut().take(self.values).enumerate() {
+            let start = at * self.stride + n * size;
+            let number = match (self.component, self.data.get(start..start + size)?) {
+                (ComponentType::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+                (ComponentType::U32, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
+                (ComponentType::U16, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
+                (ComponentType::I16, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
+                (ComponentType::U8, &[a]) => f64::from(a),
+                (ComponentType::I8, &[a]) => f64::from(a as i8),
+                _ => return None,
+            };
+            *value = number * self.scale;
+        }
+        Some(element)
     }
 }

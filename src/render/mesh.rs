@@ -10,6 +10,7 @@ use super::corner::Corner;
 use super::hit::{Frame, Hit, NEAR};
 use super::{glb, obj};
 use crate::error::{Error, Result};
+use crate::run::budget::Room;
 use crate::vector::{Vector, along, cross, dot, length, minus, unit};
 
 /// A triangle as it is asked for.
@@ -21,6 +22,11 @@ struct Triangle {
     mirrored: bool,
     node: usize,
 }
+
+/// Memory of a triangle: as it is read, as it is asked for, and two nodes of the tree. Corners are gone when the tree is
+/// built, which makes up for the lists that its builder sorts triangles into.
+pub(super) const TRIANGLE_BYTES: u64 =
+    (size_of::<[Corner; 3]>() + size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>()) as u64;
 
 /// Triangles in a tree, scaled and moved so that they just fit the sphere of radius 1 around the origin.
 pub struct Mesh {
@@ -45,24 +51,28 @@ impl BHShape<f64, 3> for Triangle {
 }
 
 impl Mesh {
-    /// The most triangles that so many bytes hold, with their tree and while they are read.
-    pub fn most_within(bytes: u64) -> usize {
-        let each = size_of::<[Corner; 3]>() + size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>();
-        usize::try_from(bytes / each as u64).unwrap_or(usize::MAX)
-    }
-
-    /// Reads a file, Wavefront OBJ or binary glTF (GLB), by the ending of its name; at most so many triangles.
+    /// Reads a file, Wavefront OBJ or binary glTF (GLB), by the ending of its name. What stays in memory is taken of the
+    /// room; what a file claims beyond it is refused before it is decoded.
     ///
     /// # Errors
     /// Another ending, a file that is damaged, triangles without texture coordinates, and too many of them.
-    pub fn read(name: &str, bytes: &[u8], most: usize) -> Result<Self> {
+    pub fn read(name: &str, bytes: &[u8], room: &mut Room) -> Result<Self> {
         let ending = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+        let mut spare = *room;
+        spare.take("the file of a mesh", bytes.len() as u64).map_err(|error| error.context(name))?;
         let corners = match ending.as_str() {
-            "obj" => obj::corners(bytes, most),
-            "glb" => glb::corners(bytes, most),
+            "obj" => obj::corners(bytes, &mut spare),
+            "glb" => glb::corners(bytes, &mut spare),
             _ => Err(Error::usage("expected a mesh whose name ends in .obj or .glb")),
         };
-        corners.and_then(Self::new).map_err(|error| error.context(name))
+        let mesh = corners.and_then(Self::new).map_err(|error| error.context(name))?;
+        room.take("a mesh", mesh.bytes())?;
+        Ok(mesh)
+    }
+
+    /// Memory that it takes.
+    pub fn bytes(&self) -> u64 {
+        (self.triangles.capacity() * (size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>())) as u64
     }
 
     /// Of three corners each. Triangles without an extent are left out.
@@ -72,7 +82,9 @@ impl Mesh {
     pub fn new(corners: Vec<[Corner; 3]>) -> Result<Self> {
         let mut corners = corners;
         fit(&mut corners)?;
-        let mut triangles: Vec<Triangle> = corners.iter().filter_map(triangle).collect();
+        let mut triangles: Vec<Triangle> = Vec::with_capacity(corners.len());
+        triangles.extend(corners.iter().filter_map(triangle));
+        drop(corners);
         if triangles.is_empty() {
             return Err(Error::input("a mesh without triangles that have an extent"));
         }

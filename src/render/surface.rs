@@ -49,6 +49,22 @@ impl Surface {
     }
 }
 
+impl Surface {
+    /// Whether a place is known to lie within it, or on it, where no light shines out of. Of triangles it is not known.
+    pub fn holds(&self, place: Vector) -> bool {
+        let [x, y, z] = place;
+        match self {
+            Self::Endless => z == 0.0,
+            Self::Plane => z == 0.0 && x.abs().max(y.abs()) <= 1.0,
+            Self::Sphere => dot(place, place) <= 1.0,
+            Self::Cylinder => {
+                x * x + z * z <= CYLINDER_RADIUS * CYLINDER_RADIUS && y.abs() <= CYLINDER_HEIGHT
+            }
+            Self::Mesh(_) => false,
+        }
+    }
+}
+
 /// Where a ray meets a level plane at a z.
 fn level(ray: &Ray, z: f64, within: impl Fn(Vector) -> bool) -> Option<Hit> {
     let distance = (z - ray.origin[2]) / ray.direction[2];

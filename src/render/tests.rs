@@ -16,9 +16,14 @@ use crate::method::value::evaluator::Evaluator;
 use crate::method::value::table::ClusterTable;
 use crate::method::value::triangulation::triangulate;
 use crate::picture::Picture;
+use crate::run::budget::{Allowance, Room};
 use crate::run::{Context, progress::Silent};
 use crate::shape::Size;
 use crate::vector::{Vector, along, dot, unit};
+
+fn room() -> Room {
+    Room::new(Allowance::new(64 << 20))
+}
 
 const SIZE: Size = Size { height: 48, width: 48 };
 
@@ -103,13 +108,13 @@ fn radiance(rows: usize, value: impl Fn(usize, usize) -> [u8; 4]) -> Vec<u8> {
 #[test]
 fn light_of_one_from_everywhere_makes_white_white_and_a_spot_is_a_light() {
     // 128 / 256 * 2^(129 - 128) = 1.
-    let even = Environment::read(&radiance(3, |_, _| [128, 128, 128, 129]), 30.0).unwrap();
+    let even = Environment::read(&radiance(3, |_, _| [128, 128, 128, 129]), 30.0, &mut room()).unwrap();
     let even = scene(Surface::Sphere, even.lights(600));
     let picture = shown(&even, &white(), [0.0, 0.0, 4.0], 2);
     // A picture so coarse has few lights, all of whose directions count.
     let middle = picture.pixels[24 * 48 + 24];
     assert!(middle.iter().all(|value| (0.8..1.2).contains(value)), "{middle:?}");
-    let fine = Environment::read(&radiance(64, |_, _| [128, 128, 128, 129]), 0.0).unwrap();
+    let fine = Environment::read(&radiance(64, |_, _| [128, 128, 128, 129]), 0.0, &mut room()).unwrap();
     let fine = scene(Surface::Sphere, fine.lights(512));
     for (n, pixel) in shown(&fine, &white(), [0.0, 0.0, 4.0], 2).pixels.iter().enumerate() {
         assert!(on_sphere(n).is_none() || (0.94..1.03).contains(&pixel[0]), "{n}: {pixel:?}");
@@ -118,7 +123,7 @@ fn light_of_one_from_everywhere_makes_white_white_and_a_spot_is_a_light() {
     for (turn, expected) in [(0.0, [-0.707, 0.707, 0.0]), (90.0, [0.0, 0.707, -0.707])] {
         let spot =
             radiance(64, |row, column| if (row, column) == (15, 31) { [200, 0, 0, 150] } else { [0; 4] });
-        let spot = Environment::read(&spot, turn).unwrap();
+        let spot = Environment::read(&spot, turn, &mut room()).unwrap();
         let lights = spot.lights(64);
         assert_eq!(lights.len(), 1);
         let Place::Far(direction) = lights[0].place else { panic!("an environment is far away") };
@@ -126,7 +131,7 @@ fn light_of_one_from_everywhere_makes_white_white_and_a_spot_is_a_light() {
         assert!(lights[0].color[0] > 0.0 && lights[0].color[1] == 0.0);
         assert!(spot.seen(direction)[0] > 0.0, "what lights is seen where it is");
     }
-    assert!(Environment::read(b"no picture", 0.0).is_err());
+    assert!(Environment::read(b"no picture", 0.0, &mut room()).is_err());
 }
 
 /// A square of two triangles in the plane z = 0 whose texture coordinates are given by place.
@@ -175,9 +180,14 @@ fn glb(triangles: &[[Corner; 3]], x: f64) -> Vec<u8> {
         blob.len()
     );
     text.push_str(&" ".repeat((4 - text.len() % 4) % 4));
+    in_one_file(&text, &blob)
+}
+
+/// A description, of a multiple of four bytes, and the numbers that it speaks of.
+fn in_one_file(text: &str, blob: &[u8]) -> Vec<u8> {
     let mut bytes = b"glTF\x02\0\0\0".to_vec();
     bytes.extend(((28 + text.len() + blob.len()) as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", text.as_bytes()), (b"BIN\0", &blob)] {
+    for (kind, chunk) in [(b"JSON", text.as_bytes()), (b"BIN\0", blob)] {
         bytes.extend((chunk.len() as u32).to_le_bytes());
         bytes.extend(kind);
         bytes.extend(chunk);
@@ -217,9 +227,9 @@ fn the_material_lies_as_the_texture_does_also_turned_and_mirrored() {
         let files = [
             ("corners", Mesh::new(plain.clone())),
             ("corners with tangents", Mesh::new(with_tangents.clone())),
-            ("obj", Mesh::read("a.obj", &obj(&plain), 1000)),
-            ("glb", Mesh::read("a.glb", &glb(&plain, 1.0), 1000)),
-            ("glb with tangents", Mesh::read("a.GLB", &glb(&with_tangents, 1.0), 1000)),
+            ("obj", Mesh::read("a.obj", &obj(&plain), &mut room())),
+            ("glb", Mesh::read("a.glb", &glb(&plain, 1.0), &mut room())),
+            ("glb with tangents", Mesh::read("a.GLB", &glb(&with_tangents, 1.0), &mut room())),
         ];
         for (what, mesh) in files {
             let scene = scene(Surface::Mesh(mesh.unwrap()), vec![Light::far(light)]);
@@ -232,7 +242,7 @@ fn the_material_lies_as_the_texture_does_also_turned_and_mirrored() {
         }
     }
     // An object that its node mirrors is mirrored with its texture, and keeps its front.
-    let mesh = Mesh::read("a.glb", &glb(&square(|x, y| [x, y], None), -1.0), 1000).unwrap();
+    let mesh = Mesh::read("a.glb", &glb(&square(|x, y| [x, y], None), -1.0), &mut room()).unwrap();
     let scene = scene(Surface::Mesh(mesh), vec![Light::far(light)]);
     let pixel = shown(&scene, &compass(), [0.0, 0.0, 4.0], 1).pixels[24 * 48 + 24];
     assert!((f64::from(pixel[0]) - (0.5 - 0.5 * lx)).abs() < 0.02, "{pixel:?}");
@@ -263,17 +273,18 @@ fn damaged_meshes_are_refused_or_read_and_never_more() {
     let triangles = square(|x, y| [x, y], Some(([1.0, 0.0, 0.0], 1.0)));
     for (name, bytes) in [("a.glb", glb(&triangles, 1.0)), ("a.obj", obj(&triangles))] {
         for end in 0..bytes.len() {
-            let _ = Mesh::read(name, &bytes[..end], 1000);
+            let _ = Mesh::read(name, &bytes[..end], &mut room());
         }
         for at in 0..bytes.len() {
             for bit in 0..8 {
                 let mut flipped = bytes.clone();
                 flipped[at] ^= 1 << bit;
-                let _ = Mesh::read(name, &flipped, 1000);
+                let _ = Mesh::read(name, &flipped, &mut room());
             }
         }
     }
-    let text = |text: &str| Mesh::read("a.obj", text.as_bytes(), 1000).err().map(|error| error.to_string());
+    let text =
+        |text: &str| Mesh::read("a.obj", text.as_bytes(), &mut room()).err().map(|error| error.to_string());
     assert!(
         text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").is_some_and(|told| told.contains("texture coordinates"))
     );
@@ -281,7 +292,7 @@ fn damaged_meshes_are_refused_or_read_and_never_more() {
     assert!(text(mixed).is_some_and(|told| told.contains("line 6: a face")), "{:?}", text(mixed));
     assert!(text("").is_some_and(|told| told.contains("without triangles")));
     assert!(text("v 0 0 0\nv nan 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n").is_some());
-    assert!(Mesh::read("a.stl", b"solid", 1000).is_err());
+    assert!(Mesh::read("a.stl", b"solid", &mut room()).is_err());
     // A tree as deep as it gets: places that halve again and again.
     let deep = |n: i32| {
         let corner = |x: f64, y: f64| Corner {
@@ -293,6 +304,116 @@ fn damaged_meshes_are_refused_or_read_and_never_more() {
     let mesh = Surface::Mesh(Mesh::new((0..400).map(deep).collect()).unwrap());
     let straight = |x: f64| Ray { origin: [x, 0.0, 1.0], direction: [0.0, 0.0, -1.0] };
     assert!((0..200).filter_map(|n| mesh.hit(&straight(f64::from(n) / 100.0 - 1.0))).count() > 0);
+}
+
+/// A triangle with indices: positions, texture coordinates and indices lie one behind the other, the indices as U32 of
+/// 0, 1 and 2.
+fn triangle_glb(change: impl Fn(String) -> String) -> Vec<u8> {
+    let places = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
+    let textures = [0.0f32, 0.0, 1.0, 0.0, 0.0, 1.0].map(f32::to_le_bytes);
+    let indices = [0u32, 1, 2].map(u32::to_le_bytes);
+    let blob = [&places.concat()[..], &textures.concat(), &indices.concat()].concat();
+    let text = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":2}]}],
+        "buffers":[{"byteLength":72}],"bufferViews":[{"buffer":0,"byteLength":36},
+        {"buffer":0,"byteOffset":36,"byteLength":24},{"buffer":0,"byteOffset":60,"byteLength":12}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+        {"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"},
+        {"bufferView":2,"componentType":5125,"count":3,"type":"SCALAR"}]}"#;
+    let mut text = change(text.to_owned());
+    text.push_str(&" ".repeat((4 - text.len() % 4) % 4));
+    in_one_file(&text, &blob)
+}
+
+#[test]
+fn numbers_of_a_glb_are_of_the_kind_that_its_standard_says() {
+    let told = |change: &dyn Fn(String) -> String| {
+        let mesh = Mesh::read("a.glb", &triangle_glb(change), &mut room());
+        mesh.map_or_else(|error| error.to_string(), |mesh| format!("{} read", mesh.triangles()))
+    };
+    let instead = |from: &'static str, to: &'static str| told(&|text: String| text.replacen(from, to, 1));
+    assert_eq!(told(&|text| text), "1 read");
+    for (kind, name) in [("5126", "F32"), ("5120", "I8"), ("5122", "I16")] {
+        let found = told(&|text| text.replacen("5125", kind, 1));
+        let expected =
+            format!("accessor 2: got 1 value of {name} for an index, expected one of U8, U16 or U32");
+        assert!(found.contains(&expected), "{found}");
+    }
+    let found = instead(r#""type":"SCALAR""#, r#""type":"SCALAR","normalized":true"#);
+    assert!(found.contains("U32, normalized, for an index"), "{found}");
+    let found = instead(r#""count":3,"type":"SCALAR""#, r#""count":1,"type":"VEC3""#);
+    assert!(found.contains("got 3 values of U32 for an index"), "{found}");
+    let found = instead("VEC3", "VEC2");
+    assert!(found.contains("accessor 0: got 2 values of F32 for a vertex, expected Vec3"), "{found}");
+    let found = told(&|text| text.replacen("VEC2", "SCALAR", 1));
+    assert!(found.contains("accessor 1: got 1 value of F32 for a vertex, expected Vec2"), "{found}");
+    let found = instead("5126", "5125");
+    assert!(found.contains("got 3 values of U32 for a vertex"), "{found}");
+}
+
+#[test]
+fn a_glb_beyond_memory_is_refused_before_it_is_decoded() {
+    let told = |change: &dyn Fn(String) -> String| {
+        Mesh::read("a.glb", &triangle_glb(change), &mut room()).err().map(|error| error.to_string())
+    };
+    // A description of many nodes; a mesh that is there many times; primitives without a triangle.
+    let nodes = told(&|text| text.replacen("{\"mesh\":0}", &vec!["{}"; 200_000].join(","), 1)).unwrap();
+    assert!(nodes.contains("the description of a mesh") && nodes.contains("64 MiB are allowed"), "{nodes}");
+    let primitive = r#"{"attributes":{"POSITION":0,"TEXCOORD_0":1},"indices":2}"#;
+    let large = || Room::new(Allowance::new(400 << 20));
+    for count in ["3", "1"] {
+        let change = |text: String| {
+            let nodes = text.replacen("\"nodes\":[0]", &format!("\"nodes\":[{}]", all(5000)), 1);
+            let nodes = nodes.replacen("{\"mesh\":0}", &vec!["{\"mesh\":0}"; 5000].join(","), 1);
+            let nodes = nodes.replacen(primitive, &vec![primitive; 5000].join(","), 1);
+            nodes.replacen(
+                "\"count\":3,\"type\":\"SCALAR\"",
+                &format!("\"count\":{count},\"type\":\"SCALAR\""),
+                1,
+            )
+        };
+        let found = Mesh::read("a.glb", &triangle_glb(change), &mut large()).err().unwrap().to_string();
+        assert!(found.contains("a mesh of") && found.contains("400 MiB are allowed"), "{count}: {found}");
+    }
+    let mut room = room();
+    Mesh::read("a.glb", &triangle_glb(|text| text), &mut room).unwrap();
+    assert!(room.left() < super::tests::room().left(), "a mesh takes of the room");
+}
+
+/// The numbers up to one, with commas.
+fn all(count: usize) -> String {
+    (0..count).map(|n| n.to_string()).collect::<Vec<_>>().join(",")
+}
+
+#[test]
+fn light_from_opposite_sides_is_not_lost_where_one_light_stands_for_both() {
+    // Two spots on the horizon, left and right of the middle; and the same light from everywhere.
+    let spots = |row: usize, column: usize| match (row, column) {
+        (31 | 32, 32 | 96) => [200, 200, 200, 140],
+        _ => [0; 4],
+    };
+    let even = |_: usize, _: usize| [128, 128, 128, 129];
+    for picture in [radiance(64, spots), radiance(64, even)] {
+        let environment = Environment::read(&picture, 0.0, &mut room()).unwrap();
+        let energy = |count: usize| environment.lights(count).iter().map(|light| light.color[1]).sum::<f64>();
+        assert!(energy(256) > 0.0);
+        for count in [1, 2, 3] {
+            assert!((energy(count) / energy(256) - 1.0).abs() < 1e-9, "{count}: {}", energy(count));
+            let shines = |light: &Light| match light.place {
+                Place::Far(direction) => environment.seen(direction)[1] > 0.0,
+                Place::At(_) => false,
+            };
+            assert!(environment.lights(1).iter().all(shines), "a light from where there is none");
+        }
+    }
+}
+
+#[test]
+fn an_environment_beyond_memory_is_refused_before_it_is_decoded() {
+    let picture = radiance(64, |_, _| [128, 128, 128, 129]);
+    let small = Allowance::new((12 << 20) + 200_000);
+    let told = Environment::read(&picture, 0.0, &mut Room::new(small)).err().unwrap().to_string();
+    assert!(told.contains("an environment of 128 x 64 takes 13 MiB"), "{told}");
 }
 
 #[test]

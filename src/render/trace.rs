@@ -16,8 +16,8 @@ use crate::run::Context;
 use crate::shape::Size;
 use crate::vector::{along, dot, turned};
 
-/// Rows that are computed before a stop is looked for.
-const BAND_ROWS: usize = 16;
+/// Pixels of a row that a thread computes before it looks for a stop.
+const TOGETHER: usize = 32;
 
 /// From so many lights on, weights are gathered for every measured light: more lights then cost no more look-ups.
 const MANY: usize = 9;
@@ -62,7 +62,7 @@ pub struct Rendered {
     pub beyond: bool,
 }
 
-/// Makes a picture of `samples` rays a pixel, the same bytes whatever the threads.
+/// Makes a picture of `samples` rays per pixel, the same bytes whatever the threads.
 ///
 /// # Errors
 /// Those of reading the texture, and a stop.
@@ -78,24 +78,24 @@ where
     Evaluator<V>: Sync,
 {
     let mut pixels = vec![[0.0f32; 3]; size.texels()];
-    let mut beyond = false;
-    for (band, rows) in pixels.chunks_mut(BAND_ROWS * size.width).enumerate() {
+    let part = |row: usize, (number, pixels): (usize, &mut [[f32; 3]])| -> Result<bool> {
         context.check_stop()?;
-        let row = |(number, pixels): (usize, &mut [[f32; 3]])| -> Result<bool> {
-            let mut painter =
-                Painter { scene, material: material.0, texels: material.1.reader(), tints: Vec::new() };
-            for (column, pixel) in pixels.iter_mut().enumerate() {
-                let place = [column as f64, (band * BAND_ROWS + number) as f64];
-                *pixel = painter.pixel(camera, place, samples)?;
-            }
-            Ok(painter.texels.beyond)
-        };
-        let found = context.install(|| {
-            rows.par_chunks_mut(size.width).enumerate().map(row).try_reduce(|| false, |a, b| Ok(a || b))
-        })?;
-        beyond |= found;
-        context.progress.advance(rows.len().div_ceil(size.width) as u64);
-    }
+        let mut painter =
+            Painter { scene, material: material.0, texels: material.1.reader(), tints: Vec::new() };
+        for (column, pixel) in pixels.iter_mut().enumerate() {
+            *pixel = painter.pixel(camera, [(number * TOGETHER + column) as f64, row as f64], samples)?;
+        }
+        Ok(painter.texels.beyond)
+    };
+    let either = |a: bool, b: bool| Ok(a || b);
+    let row = |(row, pixels): (usize, &mut [[f32; 3]])| {
+        let parts = pixels.par_chunks_mut(TOGETHER).enumerate();
+        let beyond = parts.map(|pixels| part(row, pixels)).try_reduce(|| false, either);
+        context.progress.advance(1);
+        beyond
+    };
+    let rows = pixels.par_chunks_mut(size.width).enumerate();
+    let beyond = context.install(|| rows.map(row).try_reduce(|| false, either))?;
     Ok(Rendered { picture: Picture::linear(size, pixels), beyond })
 }
 

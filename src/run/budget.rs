@@ -56,6 +56,49 @@ impl Allowance {
     }
 }
 
+/// An allowance, of which parts are taken one after the other by what stays in memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    allowance: Allowance,
+    taken: u64,
+}
+
+impl Room {
+    /// All that is allowed, beside what the program itself takes.
+    pub fn new(allowance: Allowance) -> Self {
+        Self { allowance, taken: OWN_BYTES }
+    }
+
+    /// Checks that there is room for so many bytes beside what is taken already.
+    ///
+    /// # Errors
+    /// As [`Allowance::require`].
+    pub fn require(&self, what: &str, bytes: u64) -> Result<()> {
+        let beside = if self.taken > OWN_BYTES { ", with all that is beside it," } else { "" };
+        self.allowance.require(&format!("{what}{beside}"), self.taken.saturating_add(bytes), "")
+    }
+
+    /// Takes so many bytes.
+    ///
+    /// # Errors
+    /// As [`Self::require`].
+    pub fn take(&mut self, what: &str, bytes: u64) -> Result<()> {
+        self.require(what, bytes)?;
+        self.taken = self.taken.saturating_add(bytes);
+        Ok(())
+    }
+
+    /// Gives back so many bytes that were taken.
+    pub fn give_back(&mut self, bytes: u64) {
+        self.taken = self.taken.saturating_sub(bytes).max(OWN_BYTES);
+    }
+
+    /// Bytes that are left.
+    pub fn left(&self) -> u64 {
+        self.allowance.bytes.saturating_sub(self.taken)
+    }
+}
+
 /// `64 MiB are`, in whole units, rounded down.
 fn amount(bytes: u64) -> String {
     let (number, unit) = match bytes {

@@ -21,10 +21,10 @@ use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
 use crate::store::model::components::{ComponentsRecipe, Found, raw_bytes};
 use crate::store::model::tile::{TileRecipe, TileReport};
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Stage, UNPACKED};
 pub use crate::store::packed::{ENDING, is_packed};
 use crate::store::packed::{
-    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
+    LICENCE, MEASUREMENT, PackedFile, SAMPLES, TEXEL_MM, TRANSFER, components_of, of_packed,
 };
 
 /// How small, or how good.
@@ -66,10 +66,16 @@ pub struct Packed {
     pub components_of_model: usize,
     /// Peak signal-to-noise ratio to the samples, dB.
     pub psnr_db: Option<f64>,
+    /// The commands that give it more components, where all that the model has are in it and there can be more.
+    #[serde(skip)]
+    pub more: Option<String>,
     /// Whether it was there already.
     #[serde(skip)]
     pub made: Option<Made>,
 }
+
+/// Those that a model holds in its tile.
+const OF_THE_TILE: [&str; 3] = [SAMPLES, TRANSFER, MEASUREMENT];
 
 /// The curve's name in a packed model.
 fn transfer_name(transfer: Transfer) -> &'static str {
@@ -95,15 +101,15 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
     // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
     context.require("packing components", 5 * model.components_bytes()?)?;
-    let mut whole = unpacked_model(&model)?;
-    whole.texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
-    whole.texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
+    let licence = options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone()));
+    let texel_mm = options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string()));
+    let whole = unpacked_model(&model, licence.chain(texel_mm).collect())?;
     if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
         return Err(Error::usage(format!(
             "{}: its components come from a packed file, so it is not known how far they are from the measurement",
             options.model.display()
         ))
-        .hint("ask for bytes or a ratio, or find the components of the measurement: btf components"));
+        .hint("ask for bytes or a ratio, or pack the model that the file was made of"));
     }
     let target = match options.quality {
         Quality::Bytes(bytes) => packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
@@ -115,7 +121,21 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         .compute(|| packed::pack(&whole, report.squared_error, target))
         .map_err(|error| Error::usage(format!("{}: {error}", options.model.display())))?;
     let made = output::prepare_bytes(&options.output, context.existing, &file.bytes)?.publish()?;
+    let twice = 2 * report.components;
+    // Not of components that were unpacked: there is no measurement to find more in.
+    let can_have_more = report.squared_error.is_some()
+        && file.components == report.components
+        && twice <= whole.texels().min(whole.brdf());
+    let more = can_have_more.then(|| {
+        format!(
+            "{} --components {twice} --force, then btf pack {} {} --force with the same --quality",
+            model.command(Stage::Components),
+            options.model.display(),
+            options.output.display()
+        )
+    });
     Ok(Packed {
+        more,
         bytes: file.bytes.len() as u64,
         tile_bytes: report.tile_bytes,
         components: file.components,
@@ -132,15 +152,15 @@ pub(crate) fn packed_and_unpacked(
     bytes: u64,
     context: &Context<'_>,
 ) -> Result<Option<(Components, u64)>> {
-    let whole = unpacked_model(model)?;
+    let whole = unpacked_model(model, vec![])?;
     let target = packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX));
     let Ok(file) = context.compute(|| packed::pack(&whole, None, target)) else { return Ok(None) };
-    let unpacked = PackedFile::of(model.path(), &file.bytes)?;
-    Ok(Some((OpenedFile::of(unpacked)?.components, file.bytes.len() as u64)))
+    let unpacked = packed::unpack(&file.bytes).map_err(|error| of_packed(model.path(), &error))?;
+    Ok(Some((components_of(&unpacked.model), file.bytes.len() as u64)))
 }
 
-/// The components of a model as the packer takes them.
-fn unpacked_model(model: &Model) -> Result<packed::Model> {
+/// The components of a model as the packer takes them, with what is said of them anew.
+fn unpacked_model(model: &Model, said_anew: Vec<(String, String)>) -> Result<packed::Model> {
     let components = model.components()?;
     let tile: TileReport = model.tile_report()?;
     let count = components.count();
@@ -162,6 +182,14 @@ fn unpacked_model(model: &Model) -> Result<packed::Model> {
     if tile.patch.is_none() {
         // Of a tile that is the whole measurement it can be told again which texel is which.
         texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
+    }
+    texts.extend(said_anew);
+    // What the file said that the components were unpacked from, unless it is said anew.
+    let said: ComponentsReport = model.report(Stage::Components)?;
+    for (name, text) in said.texts {
+        if !texts.iter().any(|(there, _)| *there == name) {
+            texts.push((name, text));
+        }
     }
     Ok(packed::Model {
         size: tile.size,
@@ -222,13 +250,27 @@ pub struct About {
 /// What a packed model holds.
 ///
 /// # Errors
-/// A file that is none, or is damaged before its first plane ends.
+/// A file that is none, or is damaged before its first plane ends; channels that are not understood.
 pub fn about(path: &Path) -> Result<About> {
-    let file = PackedFile::read(path)?;
-    let (notes, samples, bytes) = (file.notes(), file.sample_type(), file.bytes);
+    let file = PackedFile::open(path)?;
+    let (notes, samples) = (file.notes(), file.sample_type());
     let whole_measurement = file.text(MEASUREMENT).is_some();
-    let packed::Unpacked { model, planes, header_bytes, centres, .. } = file.unpacked;
-    let values = (model.texels() * model.brdf()) as u64;
+    let raw_components = file.outline.components();
+    let packed::Outline {
+        size,
+        wraps,
+        views,
+        lights,
+        channels,
+        texts,
+        planes,
+        bytes,
+        header_bytes,
+        centres,
+        ..
+    } = file.outline;
+    let brdf = views.len() * lights.len() * channels.len();
+    let values = (size[0] * size[1] * brdf) as u64;
     let plane = |plane: &packed::SectionEnd| Section {
         bytes: plane.end,
         components: plane.components,
@@ -236,18 +278,18 @@ pub fn about(path: &Path) -> Result<About> {
     };
     Ok(About {
         kind: "packed model",
-        size: [model.size[1], model.size[0]],
-        wraps: model.wraps,
-        directions: [model.views.len(), model.lights.len()],
+        size: [size[1], size[0]],
+        wraps,
+        directions: [views.len(), lights.len()],
         bytes,
         header_bytes,
         centres,
-        raw_bytes: raw_bytes(model.components.len(), model.brdf(), model.texels()),
+        raw_bytes: raw_bytes(raw_components, brdf, size[0] * size[1]),
         whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
-        channels: model.channels,
-        texts: model.texts,
+        channels,
+        texts,
         notes,
     })
 }
@@ -270,15 +312,15 @@ pub struct Restored {
 /// # Errors
 /// A file that is none; a model there that is another; those of writing.
 pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restored> {
-    let opened = PackedFile::read(file)?;
-    let (description, notes) = (opened.description()?, opened.notes());
-    context.require("unpacking components", opened.memory_bytes())?;
-    let psnr_db = opened.unpacked.planes.last().map(|plane| plane.decibels).filter(|&found| found > 0.0);
+    let opened = PackedFile::open(file)?;
+    let notes = opened.notes();
+    let from = opened.model(context)?;
+    let psnr_db = opened.outline.planes.last().map(|plane| plane.decibels).filter(|&found| found > 0.0);
     let named = opened.text(MEASUREMENT).map(str::to_owned);
-    let PackedFile { unpacked: packed::Unpacked { model: from, .. }, digest, .. } = opened;
+    let PackedFile { description, digest, .. } = opened;
     let (size, transfer) = (description.size, description.transfer);
     let model = Model::create(path, context)?;
-    let named = named.unwrap_or_else(|| format!("packed:{digest}"));
+    let named = named.unwrap_or_else(|| format!("{UNPACKED}{digest}"));
     let tile = if from.wraps { "periodic" } else { "none" }.to_owned();
     let tile_recipe = TileRecipe { measurement: named, tile, seed: 1, lattice: None }.to_value()?;
     if let Some(_lock) = model.begin(Stage::Tile, &tile_recipe, context)? {
@@ -294,6 +336,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
             measurement_size: from.size,
             lattice: Lattice::default(),
             cells: vec![],
+            black: 0.0,
         };
         model.write_directions(&description)?;
         model.write_tile(&Tile::whole(size, from.wraps))?;
@@ -336,9 +379,11 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         components,
         strengths: vec![],
         squared_error: None,
+        not_finite: 0,
         psnr_db,
         bytes: model.bytes_of_components(components)?,
         tile_bytes: description.bytes(),
+        texts: from.texts.into_iter().filter(|(name, _)| !OF_THE_TILE.contains(&name.as_str())).collect(),
     };
     model.finish(Stage::Components, &recipe, &report, context)?;
     Ok(done(false))

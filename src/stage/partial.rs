@@ -51,7 +51,8 @@ impl Partial {
         &self.folder
     }
 
-    fn path(&self, unit: usize) -> PathBuf {
+    /// The file of a unit.
+    pub(crate) fn path(&self, unit: usize) -> PathBuf {
         self.folder.join(format!("{unit}.json"))
     }
 

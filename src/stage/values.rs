@@ -13,13 +13,14 @@ use serde::Serialize;
 use super::image::{cluster_colors, of_stage};
 use crate::color::Transfer;
 use crate::error::{Error, Result};
-use crate::method::value::components::ComponentTable;
+use crate::method::value::components::{ComponentTable, Components};
 use crate::method::value::evaluate::Appearance;
 use crate::method::value::evaluator::Evaluator;
 use crate::method::value::table::{ClusterTable, Table};
 use crate::method::value::triangulation::{Interpolator, triangulate};
 use crate::picture::Picture;
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::shape::Size;
 use crate::store::measurement::Description;
 use crate::store::model::{Model, Stage};
@@ -197,16 +198,33 @@ impl TileValues {
         Ok(Picture::linear(self.size, pixels))
     }
 
-    /// What gives values of any place, view and light, and what there is to say of it; `beside` is memory that is taken
-    /// already.
+    /// Takes the memory that [`Self::into_evaluator`] needs, beside which there must be room for some `spare` bytes.
     ///
     /// # Errors
-    /// Too little memory, and those of reading.
-    pub(crate) fn into_evaluator(
-        self,
-        beside: u64,
-        context: &Context<'_>,
-    ) -> Result<(Evaluator<Table>, Vec<String>)> {
+    /// Too little memory, and those of reading how much there is.
+    pub(crate) fn take(&self, spare: u64, room: &mut Room) -> Result<()> {
+        let (what, bytes) = match &self.kept {
+            Kept::Clusters(model) => {
+                let clusters = of_stage(model, Stage::Cluster, Model::clusters)?;
+                let [views, lights] = self.directions().map(<[Direction]>::len);
+                let what = format!("the values of {}", counted(clusters, "cluster"));
+                (what, ClusterTable::bytes([clusters, views, lights]))
+            }
+            Kept::Components(table) => {
+                let Components { mean, basis, coefficients, .. } = table.components();
+                let bytes = size_of::<f32>() * (mean.len() + basis.len() + coefficients.len());
+                ("the values of components".to_owned(), bytes as u64)
+            }
+        };
+        room.require(&what, bytes.saturating_add(spare))?;
+        room.take(&what, bytes)
+    }
+
+    /// What gives values of any place, view and light, and what there is to say of it.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub(crate) fn into_evaluator(self, context: &Context<'_>) -> Result<(Evaluator<Table>, Vec<String>)> {
         let mut notes = self.notes;
         let [views, lights] = [0, 1].map(|side| (&self.directions[side][..], &self.triangles[side][..]));
         for (name, (list, _)) in [("view", views), ("light", lights)] {
@@ -219,7 +237,7 @@ impl TileValues {
         }
         let table = match self.kept {
             Kept::Clusters(model) => {
-                let table = cluster_table(&model, [views.0.len(), lights.0.len()], beside, context)?;
+                let table = cluster_table(&model, [views.0.len(), lights.0.len()], context)?;
                 if table.not_finite() > 0 {
                     notes.push(format!(
                         "{} of the model are no finite numbers and count as 0",
@@ -255,16 +273,7 @@ pub(crate) fn beyond(entries: &[u32], count: usize) -> Error {
 }
 
 /// The clusters of a model, decoded.
-fn cluster_table(
-    model: &Model,
-    [views, lights]: [usize; 2],
-    beside: u64,
-    context: &Context<'_>,
-) -> Result<ClusterTable> {
-    let clusters = of_stage(model, Stage::Cluster, Model::clusters)?;
-    let bytes = ClusterTable::bytes([clusters, views, lights]);
-    let what = format!("the values of {}", counted(clusters, "cluster"));
-    context.require(&what, bytes.saturating_add(beside))?;
+fn cluster_table(model: &Model, [views, lights]: [usize; 2], context: &Context<'_>) -> Result<ClusterTable> {
     let mut table = ClusterTable::new(views, lights);
     for part in model.representative_chunks()? {
         context.check_stop()?;

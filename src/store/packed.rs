@@ -13,6 +13,7 @@ use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::{Context, recipe};
 use crate::shape::Size;
+use crate::words::counted;
 use crate::zarr::samples_named;
 
 /// Ending of a packed model's name.
@@ -39,39 +40,55 @@ pub(crate) fn of_packed(path: &Path, error: &packed::Error) -> Error {
     Error::input(format!("{}: {error}", path.display()))
 }
 
-/// A packed model that was read.
+/// A packed model of which nothing is decoded yet.
 pub(crate) struct PackedFile {
     path: PathBuf,
-    pub(crate) unpacked: packed::Unpacked,
+    file: MappedFile,
+    pub(crate) outline: packed::Outline,
+    /// What the samples of its tile are.
+    pub(crate) description: Description,
     /// Digest of its bytes.
     pub(crate) digest: String,
-    /// How many bytes it has.
-    pub(crate) bytes: usize,
 }
 
 impl PackedFile {
-    /// Reads one.
+    /// Opens one; whoever looks at it, unpacks it or shows it gets the same answer.
     ///
     /// # Errors
-    /// A file that is none, or is damaged before its first plane ends.
-    pub(crate) fn read(path: &Path) -> Result<Self> {
+    /// A file that is none, or is damaged before its first plane ends; directions that are none, and channels that are
+    /// not understood.
+    pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = MappedFile::open(path).map_err(|error| Error::io("open", path, error))?;
-        Self::of(path, file.as_ref())
+        let bytes: &[u8] = file.as_ref();
+        let outline = packed::outline(bytes).map_err(|error| of_packed(path, &error))?;
+        let description = description(path, &outline)?;
+        let digest = recipe::digest_bytes(bytes);
+        Ok(Self { path: path.to_owned(), outline, description, digest, file })
     }
 
-    /// Of the bytes of one; `path` stands in errors.
+    /// Decodes it; the memory for it is there ([`packed::Outline::memory_bytes`]).
     ///
     /// # Errors
-    /// As [`Self::read`].
-    pub(crate) fn of(path: &Path, bytes: &[u8]) -> Result<Self> {
-        let unpacked = packed::unpack(bytes).map_err(|error| of_packed(path, &error))?;
-        Ok(Self { path: path.to_owned(), unpacked, digest: recipe::digest_bytes(bytes), bytes: bytes.len() })
+    /// Numbers that no values can be made of.
+    pub(crate) fn decode(&self) -> Result<packed::Model> {
+        let unpacked = packed::unpack(self.file.as_ref()).map_err(|error| of_packed(&self.path, &error))?;
+        Ok(unpacked.model)
+    }
+
+    /// Decodes it within the memory of a run.
+    ///
+    /// # Errors
+    /// As [`Self::decode`]; too little memory.
+    pub(crate) fn model(&self, context: &Context<'_>) -> Result<packed::Model> {
+        let what = format!("unpacking {}", counted(self.outline.components(), "component"));
+        context.require(&what, self.outline.memory_bytes())?;
+        context.compute(|| self.decode())
     }
 
     /// What there is to say of its end.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let (there, all) = (self.unpacked.planes.len(), self.unpacked.sections);
-        match self.unpacked.ending {
+        let (there, all) = (self.outline.planes.len(), self.outline.sections);
+        match self.outline.ending {
             packed::Ending::Whole => vec![],
             packed::Ending::Cut(at) => vec![format!(
                 "the file was cut: {there} of {all} planes are there, up to byte {at}; it is coarser than it was"
@@ -84,57 +101,51 @@ impl PackedFile {
 
     /// A text by its name.
     pub(crate) fn text(&self, name: &str) -> Option<&str> {
-        let texts = &self.unpacked.model.texts;
-        texts.iter().find(|(found, _)| found == name).map(|(_, text)| text.as_str())
+        text(&self.outline.texts, name)
     }
 
     /// The type of the measured samples, where it is said.
     pub(crate) fn sample_type(&self) -> Option<SampleType> {
         self.text(SAMPLES).and_then(samples_named)
     }
+}
 
-    /// What the samples of its tile are.
-    ///
-    /// # Errors
-    /// Directions that are none, and channels that are not understood: they could not be shown.
-    pub(crate) fn description(&self) -> Result<Description> {
-        let model = &self.unpacked.model;
-        let [height, width] = model.size;
-        let description = Description {
-            size: Size::new(height, width),
-            channels: model.channels.clone(),
-            sample_type: self.sample_type().unwrap_or(SampleType::F32),
-            views: self.directions(&model.views)?,
-            lights: self.directions(&model.lights)?,
-            transfer: match self.text(TRANSFER) {
-                Some("linear") => Transfer::Linear,
-                _ => Transfer::Srgb,
-            },
-            white: 1.0,
-        };
-        description.decoder().map_err(|error| error.context(self.path.display()))?;
-        Ok(description)
-    }
+/// A text by its name.
+fn text<'a>(texts: &'a [(String, String)], name: &str) -> Option<&'a str> {
+    texts.iter().find(|(found, _)| found == name).map(|(_, text)| text.as_str())
+}
 
-    /// Memory that it takes in f64 and f32, beside its bytes.
-    pub(crate) fn memory_bytes(&self) -> u64 {
-        let model = &self.unpacked.model;
-        (self.bytes + 24 * (model.components.len() + 1) * (model.brdf() + model.texels())) as u64
-    }
+/// What the samples of a tile are.
+fn description(path: &Path, outline: &packed::Outline) -> Result<Description> {
+    let [height, width] = outline.size;
+    let description = Description {
+        size: Size::new(height, width),
+        channels: outline.channels.clone(),
+        sample_type: text(&outline.texts, SAMPLES).and_then(samples_named).unwrap_or(SampleType::F32),
+        views: directions(path, &outline.views)?,
+        lights: directions(path, &outline.lights)?,
+        transfer: match text(&outline.texts, TRANSFER) {
+            Some("linear") => Transfer::Linear,
+            _ => Transfer::Srgb,
+        },
+        white: 1.0,
+    };
+    description.decoder().map_err(|error| error.context(path.display()))?;
+    Ok(description)
+}
 
-    fn directions(&self, list: &[packed::Direction]) -> Result<Vec<Direction>> {
-        let direction = |direction: &packed::Direction| {
-            let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
-            angles.map(Angles::direction).ok_or_else(|| {
-                let packed::Direction { theta_deg, phi_deg } = direction;
-                Error::input(format!(
-                    "{}: got the direction theta {theta_deg}, phi {phi_deg}, which is none",
-                    self.path.display()
-                ))
-            })
-        };
-        list.iter().map(direction).collect()
-    }
+fn directions(path: &Path, list: &[packed::Direction]) -> Result<Vec<Direction>> {
+    let direction = |direction: &packed::Direction| {
+        let angles = Angles::new(direction.theta_deg.min(90.0), direction.phi_deg);
+        angles.map(Angles::direction).ok_or_else(|| {
+            let packed::Direction { theta_deg, phi_deg } = direction;
+            Error::input(format!(
+                "{}: got the direction theta {theta_deg}, phi {phi_deg}, which is none",
+                path.display()
+            ))
+        })
+    };
+    list.iter().map(direction).collect()
 }
 
 /// A packed model as it is evaluated.
@@ -162,44 +173,34 @@ impl Packed {
     /// Opens one within the memory of a run.
     ///
     /// # Errors
-    /// As [`PackedFile::read`]; too little memory.
+    /// As [`PackedFile::open`] and [`PackedFile::model`].
     pub(crate) fn open(path: &Path, context: &Context<'_>) -> Result<Self> {
-        let file = PackedFile::read(path)?;
-        context.require("a packed model", file.memory_bytes())?;
-        Self::of(file)
+        let file = PackedFile::open(path)?;
+        let model = file.model(context)?;
+        Ok(Self::of(file, model))
     }
 
-    /// As it is evaluated.
-    ///
-    /// # Errors
-    /// As [`PackedFile::description`].
-    pub(crate) fn of(file: PackedFile) -> Result<Self> {
-        let (description, notes, memory_bytes) = (file.description()?, file.notes(), file.memory_bytes());
+    /// As it is evaluated, once it is decoded.
+    pub(crate) fn of(file: PackedFile, from: packed::Model) -> Self {
+        let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
         let measurement = file.text(MEASUREMENT).map(str::to_owned);
-        let (digest, file_bytes) = (file.digest, file.bytes as u64);
-        let from = file.unpacked.model;
-        let list =
-            |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
-        let components = Components {
-            size: description.size,
-            brdf: [from.views.len(), from.lights.len()],
-            mean: from.mean.iter().map(|&value| value as f32).collect(),
-            basis: side_by_side(&list(|part| &part.basis), from.brdf()),
-            coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
-            channels: from.channels,
-        };
-        let (wraps, texts) = (from.wraps, from.texts);
-        Ok(Self {
-            components,
-            description,
-            wraps,
-            digest,
-            measurement,
-            texts,
-            notes,
-            file_bytes,
-            memory_bytes,
-        })
+        let (digest, file_bytes) = (file.digest, file.outline.bytes as u64);
+        let (wraps, texts) = (from.wraps, from.texts.clone());
+        let (description, components) = (file.description, components_of(&from));
+        Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
+    }
+}
+
+/// The components of a packed model as they are evaluated.
+pub(crate) fn components_of(from: &packed::Model) -> Components {
+    let list = |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
+    Components {
+        size: Size::new(from.size[0], from.size[1]),
+        brdf: [from.views.len(), from.lights.len()],
+        mean: from.mean.iter().map(|&value| value as f32).collect(),
+        basis: side_by_side(&list(|part| &part.basis), from.brdf()),
+        coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
+        channels: from.channels.clone(),
     }
 }
 

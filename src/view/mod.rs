@@ -7,6 +7,7 @@
 mod container;
 mod material;
 mod page;
+mod request;
 mod serve;
 
 use std::path::{Path, PathBuf};

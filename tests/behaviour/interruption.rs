@@ -23,6 +23,24 @@ pub fn count(folder: &Path, part: &str) -> usize {
 }
 
 #[test]
+fn a_file_that_is_cut_while_it_is_read_ends_with_a_word() {
+    use std::io::{BufRead, BufReader};
+    for (progress, told) in [("none", "btf: a file could not be read on"), ("json", "\"exit_code\":74")] {
+        let mut command = btf();
+        command.arg("view").arg(fixture().model()).args(["--progress", progress]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut String::new()).unwrap();
+        // What the system sends then.
+        let sent = Command::new("kill").args(["-BUS", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(74), "{said}");
+        assert!(said.contains(told) && said.contains("run the command again"), "{said}");
+    }
+}
+
+#[test]
 fn an_import_killed_half_way_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let store = folder.path().join("killed.zarr");

@@ -74,6 +74,44 @@ fn frames_are_the_same_pictures_whoever_makes_them() {
 }
 
 #[test]
+fn frames_whose_names_are_no_text_keep_apart() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    for name in [b"a\xff.png", b"a\xfe.png"] {
+        let out = folder.path().join(OsStr::from_bytes(name));
+        succeed(render(&fixture().model(), &out).args(["--frames", "2", "--turntable"]));
+    }
+    let names: Vec<Vec<u8>> =
+        tree(folder.path()).keys().map(|name| name.as_os_str().as_bytes().to_vec()).collect();
+    let expected = [&b"a\xfe-1.png"[..], b"a\xfe-2.png", b"a\xff-1.png", b"a\xff-2.png"];
+    assert_eq!(names, expected.map(<[u8]>::to_vec));
+}
+
+#[test]
+fn a_light_that_would_light_nothing_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("x.png");
+    for (shape, point, told) in [
+        ("plane", "0,0,0", "the origin"),
+        ("sphere", "0,-0,0", "the origin"),
+        ("sphere", "0.5,0.5,0.5", "within the object"),
+        ("sphere", "0,1,0", "on it"),
+        ("cylinder", "0,0.8,0.6", "on it"),
+        ("plane", "0.2,0.1,0", "on it"),
+        ("flat", "7,7,0", "on it"),
+    ] {
+        let mut command = render(&fixture().model(), &out);
+        command.args(["--shape", shape, "--point-light", point]);
+        let said = fail(&mut command, 2);
+        assert!(said.contains(told) && said.contains("--point-light"), "{shape} {point}: {said}");
+    }
+    for (shape, point) in [("sphere", "0.6,0.6,0.6"), ("cylinder", "0,0.7,0.61"), ("plane", "1.5,0,0")] {
+        succeed(render(&fixture().model(), &out).args(["--force", "--shape", shape, "--point-light", point]));
+    }
+}
+
+#[test]
 fn a_mesh_and_an_environment_are_read_and_what_they_lack_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

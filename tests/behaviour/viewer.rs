@@ -3,7 +3,7 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use crate::fixture::{btf, fail, fixture, succeed};
@@ -19,8 +19,20 @@ struct Served {
 impl Served {
     fn start() -> Self {
         let mut command = btf();
-        command.arg("view").arg(fixture().model()).stdout(Stdio::piped());
-        let mut child = command.spawn().unwrap();
+        command.arg("view").arg(fixture().model());
+        Self::of(command)
+    }
+
+    /// A server that may open no more than so many files.
+    fn with_files(most: usize) -> Self {
+        let mut command = Command::new("sh");
+        command.args(["-c", &format!("ulimit -n {most}; exec \"$0\" view \"$1\"")]);
+        command.arg(btf().get_program()).arg(fixture().model());
+        Self::of(command)
+    }
+
+    fn of(mut command: Command) -> Self {
+        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
         let (port, path) = line.trim().strip_prefix("http://127.0.0.1:").unwrap().split_once('/').unwrap();
@@ -35,8 +47,13 @@ impl Served {
     fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        // A server that has seen enough may answer before all is sent.
         let lines: String = headers.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
         write!(stream, "{method} {path} HTTP/1.1\r\n{lines}Connection: close\r\n\r\n").unwrap();
+        Self::answer(&mut stream)
+    }
+
+    fn answer(stream: &mut TcpStream) -> (u16, Vec<u8>) {
         let mut answer = Vec::new();
         stream.read_to_end(&mut answer).unwrap();
         let end = answer.windows(4).position(|four| four == b"\r\n\r\n").expect("no end of the headers");
@@ -92,6 +109,41 @@ fn only_who_knows_the_address_of_this_machine_reads_the_page() {
     }
     let other = Served::start();
     assert_ne!((other.port, &other.page), (served.port, &served.page), "the same address twice");
+}
+
+#[test]
+fn a_server_reads_no_more_of_a_request_than_it_needs() {
+    let served = Served::start();
+    let own = served.own();
+    let host = ("Host", own.as_str());
+    let long = "a".repeat(9_000_000);
+    assert_eq!(served.ask("GET", &format!("/{long}"), &[host]).0, 414);
+    assert_eq!(served.ask("GET", &served.page, &[host, ("Long", &long)]).0, 431);
+    assert_eq!(served.ask("GET", &served.page, &[("Host", &long)]).0, 431);
+    assert_eq!(served.ask("GET", &served.page, &vec![host; 5000]).0, 431);
+    assert_eq!(served.ask("GET", &served.page, &[host, host]).0, 400);
+    assert_eq!(served.ask("GET", &served.page, &[host, ("no name", "a")]).0, 400);
+    assert_eq!(served.ask("\u{1}", &served.page, &[host]).0, 400);
+    assert_eq!(served.ask("HEAD", &served.page, &[host]), (200, Vec::new()));
+    assert_eq!(served.ask("GET", &served.page, &[host]).0, 200);
+}
+
+#[test]
+fn a_server_outlives_more_connections_than_it_takes_at_once() {
+    // More than it takes, and more than the system lets it have.
+    for served in [Served::start(), Served::with_files(24)] {
+        let stalled: Vec<TcpStream> = (0..100)
+            .map(|_| {
+                let mut stream = TcpStream::connect(("127.0.0.1", served.port)).unwrap();
+                stream.write_all(b"GET / HTTP/1.1\r\n").unwrap();
+                stream
+            })
+            .collect();
+        let own = served.own();
+        assert_eq!(served.ask("GET", &served.page, &[("Host", &own)]).0, 200);
+        drop(stalled);
+        assert_eq!(served.ask("GET", &served.page, &[("Host", &own)]).0, 200);
+    }
 }
 
 #[test]

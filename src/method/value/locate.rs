@@ -19,7 +19,7 @@ const BINS: usize = 256;
 const NEGLIGIBLE: f32 = 1e-6;
 
 /// No triangle lies beyond that edge.
-const NONE: u16 = u16::MAX;
+const NONE: u32 = u32::MAX;
 
 /// One term of a mix.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,7 +45,7 @@ struct Facet {
     inverse: [[f32; 3]; 3],
     corners: [u16; 3],
     /// The facet across the edge opposite each corner.
-    beyond: [u16; 3],
+    beyond: [u32; 3],
 }
 
 /// Finds the mix of any direction.
@@ -53,7 +53,7 @@ pub struct Locator {
     rule: Interpolator,
     facets: Vec<Facet>,
     /// The facet to begin in, by place in the stereographic disc.
-    begin: Vec<u16>,
+    begin: Vec<u32>,
     /// Where the edges of each bin of azimuth begin in `rim`; one more than bins.
     bins: Vec<u32>,
     rim: Vec<[u16; 2]>,
@@ -82,7 +82,7 @@ impl Locator {
         let mut at = self.begin[cell(y) * GRID + cell(x)];
         // No way is longer than through all facets; rounding could turn it in a circle.
         for _ in 0..self.facets.len() {
-            let Some(facet) = self.facets.get(usize::from(at)) else { break };
+            let Some(facet) = self.facets.get(at as usize) else { return self.beyond([x, y, z]) };
             let weight = |row: [f32; 3]| row[0] * x + row[1] * y + row[2] * z;
             let weights = facet.inverse.map(weight);
             let lesser = |least: usize, corner| if weights[corner] < weights[least] { corner } else { least };
@@ -92,7 +92,7 @@ impl Locator {
             }
             at = facet.beyond[least];
         }
-        self.beyond([x, y, z])
+        self.searched([x, y, z])
     }
 
     /// The mix of a direction that lies in no facet.
@@ -106,7 +106,12 @@ impl Locator {
             let weights = [ends[0].1 as f32, ends[1].1 as f32, 0.0];
             return Located { shares: shares([i, j, i], weights), cosine_ratio: ratio as f32 };
         }
-        let mix = self.rule.mix_of(target);
+        self.searched(target.map(|value| value as f32))
+    }
+
+    /// The mix by the exhaustive search.
+    fn searched(&self, target: [f32; 3]) -> Located {
+        let mix = self.rule.mix_of(target.map(f64::from));
         let mut shares = [Share::default(); 3];
         for (share, &(number, weight)) in shares.iter_mut().zip(&mix.terms) {
             *share = Share { number: number as u16, weight: weight as f32 };
@@ -124,7 +129,7 @@ fn shares(corners: [u16; 3], weights: [f32; 3]) -> [Share; 3] {
 }
 
 fn facets(rule: &Interpolator) -> Vec<Facet> {
-    let corners: Vec<[usize; 3]> = rule.facets().take(usize::from(NONE)).collect();
+    let corners: Vec<[usize; 3]> = rule.facets().collect();
     let edge = |a: usize, b: usize| [a.min(b), a.max(b)];
     // Every edge with the facet and the corner that it is opposite to.
     let opposite = |(number, &[a, b, c]): (usize, &[usize; 3])| {
@@ -135,10 +140,10 @@ fn facets(rule: &Interpolator) -> Vec<Facet> {
     let mut beyond = vec![[NONE; 3]; corners.len()];
     for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         let [(_, first, to_first), (_, second, to_second)] = [pair[0], pair[1]];
-        beyond[first][to_first] = second as u16;
-        beyond[second][to_second] = first as u16;
+        beyond[first][to_first] = second as u32;
+        beyond[second][to_second] = first as u32;
     }
-    let facet = |(corners, beyond): (&[usize; 3], [u16; 3])| {
+    let facet = |(corners, beyond): (&[usize; 3], [u32; 3])| {
         let [a, b, c] = corners.map(|corner| rule.vectors()[corner]);
         let volume = dot(a, cross(b, c));
         let row = |first, second| cross(first, second).map(|value: f64| (value / volume) as f32);
@@ -148,7 +153,7 @@ fn facets(rule: &Interpolator) -> Vec<Facet> {
 }
 
 /// The facet that holds the middle of a cell of the stereographic disc, or comes nearest to it.
-fn nearest_facet(rule: &Interpolator, facets: &[Facet], place: usize) -> u16 {
+fn nearest_facet(rule: &Interpolator, facets: &[Facet], place: usize) -> u32 {
     let middle = |cell: usize| (2.0 * cell as f64 + 1.0) / GRID as f64 - 1.0;
     let (x, y) = (middle(place % GRID), middle(place / GRID));
     let square = x * x + y * y;
@@ -158,7 +163,7 @@ fn nearest_facet(rule: &Interpolator, facets: &[Facet], place: usize) -> u16 {
         weights.into_iter().flatten().fold(f64::INFINITY, f64::min)
     };
     let leasts = facets.iter().map(least).enumerate();
-    leasts.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(NONE, |(number, _)| number as u16)
+    leasts.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(NONE, |(number, _)| number as u32)
 }
 
 /// The bin of an azimuth, by an angle that needs no arc tangent.

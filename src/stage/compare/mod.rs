@@ -330,15 +330,23 @@ pub fn run_shared(subject: &Subject, sharing: &Sharing, context: &Context<'_>) -
         "model": subject.digest,
     });
     let partial = Partial::at(&sharing.folder, &what)?;
-    let kept = || (0..n_views).map(|view| partial.read::<Sums>(view)).collect::<Vec<_>>();
     let comparison = Comparison::open(subject)?;
+    let kept = || {
+        let read = |view| match partial.read::<Sums>(view) {
+            Some(sums) => comparison.expect_possible(&sums).map(|()| Some(sums)).map_err(|error| {
+                error.context(partial.path(view).display()).hint("delete this file and run its part again")
+            }),
+            None => Ok(None),
+        };
+        (0..n_views).map(read).collect::<Result<Vec<_>>>()
+    };
     if let Some(shard) = sharing.shard {
-        let found = kept();
+        let found = kept()?;
         let missing: Vec<usize> =
             (0..n_views).filter(|&view| shard.has(view) && found[view].is_none()).collect();
         comparison.sums(&missing, context, |view, sums| partial.write(view, sums))?;
     }
-    let sums = kept();
+    let sums = kept()?;
     let done = sums.iter().flatten().count();
     let folder = partial.folder().to_owned();
     if done < n_views && sharing.shard.is_none() {
@@ -393,6 +401,40 @@ impl<'a> Comparison<'a> {
         })?;
         context.progress.end();
         Ok(sums)
+    }
+
+    /// Checks that sums may be those of a view: a seal says only that nobody changed them by accident.
+    ///
+    /// # Errors
+    /// Counts that are not those of a view, and sums that no view has.
+    fn expect_possible(&self, sums: &Sums) -> Result<()> {
+        let description = self.measurement.description();
+        let lights = description.lights.len() as u64;
+        let texels = self.offsets.len() as u64;
+        let coloured = self.offsets.len().div_ceil(self.stride) as u64 * lights;
+        let samples = texels * description.texel_samples() as u64;
+        let steps = sums.colours.iter().try_fold(0u64, |sum, &count| sum.checked_add(count));
+        for (what, found, expected) in [
+            ("views", Some(sums.views as u64), 1),
+            ("texels", Some(sums.code_count), texels * lights),
+            ("samples", sums.sample_count.checked_add(sums.left_out), samples),
+            ("colours", Some(sums.colour_count), coloured),
+            ("colours by steps", steps, coloured),
+        ] {
+            if found != Some(expected) {
+                let found = found.map_or("more than can be counted".to_owned(), |found| found.to_string());
+                return Err(Error::input(format!("got {found} {what}, expected {expected}")));
+            }
+        }
+        let is_sum = |sum: f64| sum.is_finite() && sum >= 0.0;
+        if sums.codes > 255 * sums.code_count || sums.colours.len() > COLOUR_STEPS + 1 {
+            return Err(Error::input("got differences of lightness or colour beyond the largest there are"));
+        }
+        if !is_sum(sums.squares) || !is_sum(sums.colour) {
+            let found = format!("{} and {}", sums.squares, sums.colour);
+            return Err(Error::input(format!("got the sums {found}, expected finite ones of at least 0")));
+        }
+        Ok(())
     }
 
     fn of_view(&self, view: usize) -> Result<Sums> {

@@ -2,10 +2,12 @@
 
 mod pass;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use crate::color::curve::Unheld;
 use crate::error::{Error, Result};
 use crate::method::cluster::selection::{Order, Selection};
 use crate::method::principal::{self, ITERATIONS, PROBES_MORE, Projected, Space, TOGETHER};
@@ -152,7 +154,15 @@ impl Plan {
         let views = self.measurement.description().views.len();
 
         let mut sums = vec![vec![0.0; self.brdf() / views]; views];
-        pass.for_each(context, |block| principal::add_to_sums(&mut sums, block))?;
+        let mut unheld = Unheld::default();
+        pass.for_each(context, |block| {
+            unheld += block.unheld();
+            principal::add_to_sums(&mut sums, block);
+        })?;
+        if unheld.beyond > 0 {
+            context.progress.end();
+            return Err(self.beyond(unheld.beyond, pass.largest()));
+        }
         let mean: Vec<f32> = sums.iter().flatten().map(|sum| (sum / texels as f64) as f32).collect();
         let mut space = Space::random(mean.clone(), views, self.probes(), SEED);
         for _ in 0..ITERATIONS {
@@ -163,7 +173,17 @@ impl Plan {
         let mut projected = space.nothing_projected(texels);
         pass.for_each(context, |block| space.project(block, &mut projected))?;
         context.progress.end();
-        self.finish(mean, &space, &projected, context)
+        self.finish(mean, &space, &projected, unheld.not_finite, context)
+    }
+
+    /// That samples are beyond what components hold: how far these are from them could not be said.
+    fn beyond(&self, count: u64, largest: f64) -> Error {
+        Error::input(format!(
+            "{}: {} beyond {largest:.3e} in either direction, expected what components hold",
+            self.measurement.path().display(),
+            counted(count, "sample")
+        ))
+        .hint("no material is as bright: import it again without these texels; clusters take any value (btf cluster)")
     }
 
     /// Writes the arrays, then how it went.
@@ -172,6 +192,7 @@ impl Plan {
         mean: Vec<f32>,
         space: &Space,
         projected: &Projected,
+        not_finite: u64,
         context: &Context<'_>,
     ) -> Result<Report> {
         let found = context.compute(|| space.components(projected, self.components));
@@ -188,10 +209,12 @@ impl Plan {
             components,
             strengths: found.strengths,
             squared_error: Some(squared_error),
+            not_finite,
             psnr_db: ratio.is_finite().then(|| 10.0 * ratio.log10()),
             bytes: self.model.bytes_of_components(components)?,
             tile_bytes: description.bytes() / description.size.texels() as u64
                 * self.tile.size.texels() as u64,
+            texts: BTreeMap::new(),
         };
         self.model.finish(Stage::Components, &self.recipe, &report, context)?;
         Ok(report)

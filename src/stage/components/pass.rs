@@ -3,7 +3,7 @@
 use btfkit_formats::Samples;
 use rayon::prelude::*;
 
-use crate::color::curve::Curve;
+use crate::color::curve::{Curve, Unheld};
 use crate::error::Result;
 use crate::method::cluster::selection::{Block, Selection};
 use crate::method::principal::Texels;
@@ -24,6 +24,8 @@ pub(super) struct BlockTexels<'a> {
     views: Vec<Samples>,
     /// Where each texel lies.
     places: &'a [u32],
+    /// Texels that were read, those between included.
+    places_read: usize,
     curve: &'a Curve,
 }
 
@@ -38,7 +40,31 @@ impl Texels for BlockTexels<'_> {
     }
 }
 
+impl BlockTexels<'_> {
+    /// Samples that the curve does not hold.
+    pub(super) fn unheld(&self) -> Unheld {
+        let of_view = |samples: &Samples| {
+            let texel = samples.len() / self.places_read.max(1);
+            let mut unheld = Unheld::default();
+            for &place in self.places {
+                let first = place as usize * texel;
+                unheld += self.curve.unheld(samples, first..first + texel);
+            }
+            unheld
+        };
+        self.views.par_iter().map(of_view).reduce(Unheld::default, |mut sum, more| {
+            sum += more;
+            sum
+        })
+    }
+}
+
 impl<'a> Pass<'a> {
+    /// The largest sample that components hold.
+    pub(super) fn largest(&self) -> f64 {
+        self.curve.largest()
+    }
+
     pub(super) fn new(measurement: &'a Measurement, selection: &'a Selection, in_flight: usize) -> Self {
         let description = measurement.description();
         let curve = Curve::new(description.sample_type, description.transfer);
@@ -62,7 +88,8 @@ impl<'a> Pass<'a> {
             };
             let views = views.into_par_iter().map(read).collect::<Result<_>>()?;
             let places = self.selection.places(block.slots.clone());
-            Ok(BlockTexels { views, places, curve: &self.curve })
+            let places_read = block.windows.iter().map(|window| window.size.texels()).sum();
+            Ok(BlockTexels { views, places, places_read, curve: &self.curve })
         };
         let blocks = self.selection.blocks().iter();
         read_ahead::for_each(context, self.in_flight, blocks, read, |block| {

@@ -10,6 +10,7 @@ use crate::method::value::evaluator::Evaluator;
 use crate::method::value::table::{Table, Values};
 use crate::render::texture::{Maker, PIECE_BYTES, Pieces, Texture};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::shape::{Area, Size};
 use crate::stage::image::{PlaneOptions, model_of, of_stage, without_source};
 use crate::stage::pack;
@@ -23,6 +24,12 @@ use crate::zarr::Store;
 /// Memory of a texel of a plane while a piece of it is made, with what lies around the piece.
 const PLANE_PIECE_BYTES: u64 = 4 * 24 * 512 * 512;
 
+/// Memory of a texel of a tile: its number, where it was cut from, and what is read beside.
+const INDEX_BYTES: u64 = 16;
+
+/// Memory beside values while they are read: chunks of a store, and a piece of a texture.
+pub(super) const SPARE_BYTES: u64 = (32 << 20) + PIECE_BYTES;
+
 /// A material.
 pub(super) struct Material {
     pub(super) evaluator: Evaluator<Table>,
@@ -32,21 +39,13 @@ pub(super) struct Material {
     pub(super) notes: Vec<String>,
 }
 
-/// Opens what is to be shown; `beside` is memory that is taken already.
-pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
+/// Opens what is to be shown.
+pub(super) fn open(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
     let path = &options.source;
     if pack::is_packed(path) {
-        return of_packed(options, beside, context);
+        return of_packed(options, room, context);
     }
-    let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND]).map_err(|error| {
-        match crate::store::kind_of(path) {
-            Ok(kind) => {
-                Error::usage(format!("{} is a {kind}, expected a model or an enlargement", path.display()))
-                    .hint("make a model of a measurement first: btf model")
-            }
-            Err(_) => error,
-        }
-    })?;
+    let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND])?;
     let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
     if kind != model::KIND && options.plane.is_some() {
         return Err(Error::usage(format!(
@@ -57,18 +56,18 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
     }
     if kind == model::KIND {
         let model = Model::open(path)?;
-        let (values, mut notes) = values(&model, options.values, context)?;
+        let (values, mut notes) = values(&model, options.values, room, context)?;
         let (texture, bounds) = match options.plane {
-            Some(which) => (endless(&model, &values, which, context)?, None),
-            None => tile(&values, None)?,
+            Some(which) => (endless(&model, &values, which, room, context)?, None),
+            None => tile(&values, None, room)?,
         };
-        let (evaluator, more) = evaluator(values, beside, context)?;
+        let (evaluator, more) = values.into_evaluator(context)?;
         notes.extend(more);
         return Ok(Material { evaluator, texture, bounds, notes });
     }
     let enlarged = Enlarged::open(path)?;
     let model = model_of(&enlarged, path, options.model.as_deref())?;
-    let (values, mut notes) = values(&model, options.values, context)?;
+    let (values, mut notes) = values(&model, options.values, room, context)?;
     let by_texel = values.by() == By::Components;
     if by_texel && !enlarged.has_source() {
         return Err(without_source(path));
@@ -78,7 +77,7 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
         notes.push(format!("{} is not complete: {} missing", path.display(), counted(missing, "shard")));
     }
     let bounds = Some((enlarged.size(), enlarged.recipe().tileable));
-    let (evaluator, more) = evaluator(values, beside, context)?;
+    let (evaluator, more) = values.into_evaluator(context)?;
     notes.extend(more);
     let count = evaluator.values().entries();
     let read: Maker = Box::new(move |area: Area| {
@@ -90,12 +89,12 @@ pub(super) fn open(options: &Options, beside: u64, context: &Context<'_>) -> Res
         expect_within(&entries, count)?;
         Ok(entries)
     });
-    let texture = Texture::Pieces(Pieces::new(read, bounds, context.work_bytes() / 4));
+    let texture = pieces(read, bounds, room);
     Ok(Material { evaluator, texture, bounds, notes })
 }
 
 /// The tile of a packed model.
-fn of_packed(options: &Options, beside: u64, context: &Context<'_>) -> Result<Material> {
+fn of_packed(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
     let refused = |what: &str, why: &str| {
         Error::usage(format!("{}: {what}, and this is a packed model: {why}", options.source.display()))
             .hint("leave the option out")
@@ -110,28 +109,27 @@ fn of_packed(options: &Options, beside: u64, context: &Context<'_>) -> Result<Ma
         return Err(refused("values of clusters were asked for", "it has components only"));
     }
     let values = TileValues::of_packed(&options.source, context)?;
-    let (texture, bounds) = tile(&values, None)?;
-    let (evaluator, notes) = evaluator(values, beside, context)?;
+    values.take(SPARE_BYTES, room)?;
+    let (texture, bounds) = tile(&values, None, room)?;
+    let (evaluator, notes) = values.into_evaluator(context)?;
     Ok(Material { evaluator, texture, bounds, notes })
 }
 
 /// The values of a model that were asked for, or that it has.
-fn values(model: &Model, wanted: Option<By>, context: &Context<'_>) -> Result<(TileValues, Vec<String>)> {
+fn values(
+    model: &Model,
+    wanted: Option<By>,
+    room: &mut Room,
+    context: &Context<'_>,
+) -> Result<(TileValues, Vec<String>)> {
     let by = wanted.map_or_else(|| By::of(model), Ok)?;
     let mut notes = Vec::new();
     if wanted.is_none() && by == By::Components {
         notes.push("the model has no clusters: values are those of its components".to_owned());
     }
-    Ok((TileValues::of_model(model, by, context)?, notes))
-}
-
-/// What gives the values of places.
-pub(super) fn evaluator(
-    values: TileValues,
-    beside: u64,
-    context: &Context<'_>,
-) -> Result<(Evaluator<Table>, Vec<String>)> {
-    values.into_evaluator(beside + (32 << 20) + PIECE_BYTES, context)
+    let values = TileValues::of_model(model, by, context)?;
+    values.take(SPARE_BYTES, room)?;
+    Ok((values, notes))
 }
 
 /// Checks that all entries of a texture have values.
@@ -142,9 +140,19 @@ fn expect_within(entries: &[u32], count: usize) -> Result<()> {
     }
 }
 
+/// A texture that is made piece by piece, of which a quarter of what is left is kept.
+pub(super) fn pieces(make: Maker, bounds: Option<(Size, bool)>, room: &Room) -> Texture {
+    Texture::Pieces(Pieces::new(make, bounds, room.left() / 4))
+}
+
 /// The tile of a model; `wraps` is asked for, or as it is.
-pub(super) fn tile(values: &TileValues, wraps: Option<bool>) -> Result<(Texture, Option<(Size, bool)>)> {
+pub(super) fn tile(
+    values: &TileValues,
+    wraps: Option<bool>,
+    room: &Room,
+) -> Result<(Texture, Option<(Size, bool)>)> {
     let (size, wraps) = (values.size(), wraps.unwrap_or(values.wraps()));
+    room.require(&format!("a tile of {size}"), INDEX_BYTES * size.texels() as u64)?;
     Ok((Texture::Whole { size, wraps, index: values.entries()? }, Some((size, wraps))))
 }
 
@@ -153,6 +161,7 @@ pub(super) fn endless(
     model: &Model,
     values: &TileValues,
     which: PlaneOptions,
+    room: &Room,
     context: &Context<'_>,
 ) -> Result<Texture> {
     let size = model.tile()?.size;
@@ -162,11 +171,12 @@ pub(super) fn endless(
     let mut variation = plane.variation(which.seed);
     variation.jitter = which.jitter.unwrap_or(variation.jitter);
     plane.check(&variation)?;
-    context.require("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
+    let mut room = *room;
+    room.take("an endless plane", plane.bytes() + context.threads as u64 * PLANE_PIECE_BYTES)?;
     let entries = values.entries()?;
     let make: Maker = Box::new(move |area: Area| {
         let sources = plane.window(&variation, area.y, area.x, area.size)?;
         Ok(sources.into_iter().map(|texel| entries[texel as usize]).collect())
     });
-    Ok(Texture::Pieces(Pieces::new(make, None, context.work_bytes() / 4)))
+    Ok(pieces(make, None, &room))
 }

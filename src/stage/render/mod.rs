@@ -13,14 +13,17 @@ use crate::error::{Error, Result};
 use crate::picture::{Encoding, Picture, stream};
 use crate::render::camera::Camera;
 use crate::render::light::{Light, Place};
+use crate::render::surface::Surface;
 use crate::render::{Background, Environment, Scene};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
 use crate::stage::values::By;
-use crate::vector::Vector;
+use crate::store::{kind_of, model};
+use crate::vector::{Vector, length};
 use crate::words::counted;
 
 pub use sheets::compare;
@@ -28,7 +31,7 @@ pub use sheets::compare;
 /// Texels along a length of 1, the radius of an object, at scale 1.
 pub(crate) const DENSITY: f64 = 256.0;
 
-/// Rays a pixel, unless their number is given.
+/// Rays per pixel, unless their number is given.
 const SAMPLES: u32 = 16;
 
 /// Memory of a pixel while its picture is made and written.
@@ -37,7 +40,7 @@ const PIXEL_BYTES: u64 = 32;
 /// What a material is shown on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Seen from afar along the normal, a pixel a texel at scale 1.
+    /// Seen from the front, without perspective: one pixel per texel at scale 1.
     Flat,
     /// A square of side 2.
     Plane,
@@ -73,7 +76,7 @@ pub struct EnvironmentOptions {
     pub path: PathBuf,
     /// Turned about the vertical axis by this, degrees.
     pub turn_deg: f64,
-    /// So many lights stand for it.
+    /// It is approximated by so many directional lights.
     pub lights: usize,
     /// Whether it is seen behind the object.
     pub seen: bool,
@@ -103,7 +106,7 @@ pub struct Options {
     pub shape: Shape,
     /// Size of the picture.
     pub size: Size,
-    /// Rays a pixel; as the shape needs where absent.
+    /// Rays per pixel; as the shape needs where absent.
     pub samples: Option<u32>,
     /// Lights far away.
     pub lights: Vec<Direction>,
@@ -171,29 +174,24 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     let Options { size, .. } = *options;
     encoding.check_size(size)?;
     let picture = size.texels() as u64 * PIXEL_BYTES + encoding.memory_bytes(size);
-    context.require(&format!("a picture of {size}"), picture)?;
-    let material = material::open(options, picture, context)?;
-    let object = objects::object(options, material.bounds, context)?;
-    let camera = Camera::new(objects::view(options, &object), size)?;
-    let (lights, environment) = lights(options)?;
+    let mut room = Room::new(context.memory());
+    room.take(&format!("a picture of {size}"), picture)?;
+    let surface = objects::surface(options, &mut room, context)?;
+    let (lights, environment) = lights(options, &surface, &mut room)?;
+    // Last, since what is left of the memory keeps pieces of an endless texture.
+    let material = material::open(options, &mut room, context)?;
+    let laid = objects::laid(options, &surface, material.bounds);
+    let camera = Camera::new(objects::view(options, &surface), size)?;
     let background = match (environment, &options.environment) {
         (Some(environment), Some(chosen)) if chosen.seen => Background::Environment(environment),
         _ => Background::Grey(options.background),
     };
-    let (density, origin) = (object.density, object.origin);
     let shadows = options.shadows;
-    let mut scene = Scene {
-        surface: object.surface,
-        lights: lights.clone(),
-        background,
-        shadows,
-        density,
-        origin,
-        turn_rad: 0.0,
-    };
+    let objects::Laid { density, origin, samples } = laid;
+    let mut scene =
+        Scene { surface, lights: lights.clone(), background, shadows, density, origin, turn_rad: 0.0 };
     let count = options.frames.map_or(1, |(count, _)| count);
     let numbers: Vec<u32> = (0..count).filter(|&number| options.shard.has(number as usize)).collect();
-    let samples = options.samples.unwrap_or(object.samples);
     let mut report = Report { pictures: Vec::new(), size, notes: material.notes.clone() };
     let mut beyond = false;
     context.progress.begin("render", (numbers.len() * size.height) as u64, Counted::Items("rows"));
@@ -225,13 +223,22 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     }
     context.progress.end();
     if beyond {
-        let (size, _) = material.bounds.unwrap_or((Size::new(0, 0), false));
-        report.notes.push(format!(
-            "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; \
-             choose a larger --scale, a larger enlargement, or --plane"
-        ));
+        report.notes.push(beyond_note(options, material.bounds));
     }
     Ok(report)
+}
+
+/// What is told where an object shows more than a texture has.
+fn beyond_note(options: &Options, bounds: Option<(Size, bool)>) -> String {
+    let (size, _) = bounds.unwrap_or((Size::new(0, 0), false));
+    let more = match kind_of(&options.source) {
+        Ok(model::KIND) => "choose a larger --scale, or --plane for a surface that never ends",
+        Ok(_) => "choose a larger --scale, or make a larger enlargement",
+        Err(_) => "choose a larger --scale",
+    };
+    format!(
+        "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; {more}"
+    )
 }
 
 /// Writes a picture, its linear values times an exposure.
@@ -253,12 +260,29 @@ pub(super) fn write(
 }
 
 /// All lights, and the environment that some of them stand for.
-pub(super) fn lights(options: &Options) -> Result<(Vec<Light>, Option<Environment>)> {
+fn lights(
+    options: &Options,
+    surface: &Surface,
+    room: &mut Room,
+) -> Result<(Vec<Light>, Option<Environment>)> {
     let mut lights: Vec<Light> = options.lights.iter().map(|&direction| Light::far(direction)).collect();
-    lights.extend(options.points.iter().map(|&point| Light::at(point)));
+    for &point in &options.points {
+        let told = |what: &str| {
+            let [x, y, z] = point;
+            Error::usage(format!("a light at the point {x},{y},{z}, {what}"))
+                .hint("choose a point outside of the object, whose radius is 1: --point-light 1,1,2")
+        };
+        if length(point) == 0.0 {
+            return Err(told("the origin, where its brightness is measured"));
+        }
+        if surface.holds(point) {
+            return Err(told("which lies within the object or on it: it would light nothing"));
+        }
+        lights.push(Light::at(point));
+    }
     let Some(chosen) = &options.environment else { return Ok((lights, None)) };
     let bytes = objects::bytes_of(&chosen.path)?;
-    let environment = Environment::read(bytes.as_ref(), chosen.turn_deg)
+    let environment = Environment::read(bytes.as_ref(), chosen.turn_deg, room)
         .map_err(|error| error.context(chosen.path.display()))?;
     let around = environment.lights(chosen.lights);
     if around.is_empty() {
@@ -281,9 +305,11 @@ fn swept(light: &Light, radians: f64) -> Light {
 /// `turn.png` with the number of a picture, from 1: `turn-007.png`, as many digits as the last one has.
 fn numbered(output: &Path, number: u32, count: u32) -> PathBuf {
     let digits = count.to_string().len();
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    let ending = output.extension().unwrap_or_default().to_string_lossy();
-    output.with_file_name(format!("{stem}-{:0digits$}.{ending}", number + 1))
+    // Names are bytes: two that are not UTF-8 must not become the same.
+    let mut name = output.file_stem().unwrap_or_default().to_owned();
+    name.push(format!("-{:0digits$}.", number + 1));
+    name.push(output.extension().unwrap_or_default());
+    output.with_file_name(name)
 }
 
 /// What is told of a run.

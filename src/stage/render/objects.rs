@@ -10,51 +10,57 @@ use crate::render::interior;
 use crate::render::mesh::Mesh;
 use crate::render::surface::Surface;
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::shape::Size;
 
 /// Field of view unless one is chosen, degrees.
 const FOV_DEG: f64 = 30.0;
 
 /// The same of the interior, which is wider than it is high.
-const INTERIOR_FOV_DEG: f64 = 21.0;
+const INTERIOR_FOV_DEG: f64 = 22.0;
+
+/// The middle of the interior as its default camera sees it.
+const INTERIOR_MIDDLE: [f64; 3] = [0.045, 0.0, 0.0];
 
 /// How far the default camera is: the sphere of radius 1 fills nine tenths of the picture.
 const DISTANCE: f64 = 4.3;
 
-/// An object and how the texture lies on it.
-pub(super) struct Object {
-    pub(super) surface: Surface,
+/// How the texture lies on an object.
+pub(super) struct Laid {
     /// Texels along a length of 1.
     pub(super) density: f64,
     /// Place in the texture of what is at 0, 0 on the surface.
     pub(super) origin: [f64; 2],
-    /// Rays a pixel.
+    /// Rays per pixel.
     pub(super) samples: u32,
 }
 
-/// The object that the options ask for. A texture that does not repeat lies around its middle.
-pub(super) fn object(
-    options: &Options,
-    bounds: Option<(Size, bool)>,
-    context: &Context<'_>,
-) -> Result<Object> {
-    let density = DENSITY / options.scale;
-    let surface = match &options.shape {
+/// The object that the options ask for.
+pub(super) fn surface(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Surface> {
+    Ok(match &options.shape {
         Shape::Flat => Surface::Endless,
         Shape::Plane => Surface::Plane,
         Shape::Sphere => Surface::Sphere,
         Shape::Cylinder => Surface::Cylinder,
-        Shape::Interior => Surface::Mesh(context.compute(interior::mesh)?.with_texture_in_lengths()),
+        Shape::Interior => {
+            let mesh = context.compute(interior::mesh)?.with_texture_in_lengths();
+            room.take("the interior", mesh.bytes())?;
+            Surface::Mesh(mesh)
+        }
         Shape::Mesh(path) => {
             let file = bytes_of(path)?;
             let bytes = file.as_ref();
             let name = path.display().to_string();
-            let most = Mesh::most_within(context.memory_bytes);
-            Surface::Mesh(context.compute(|| Mesh::read(&name, bytes, most))?.with_texture_in_lengths())
+            Surface::Mesh(context.compute(|| Mesh::read(&name, bytes, room))?.with_texture_in_lengths())
         }
-    };
+    })
+}
+
+/// How a texture of this extent lies on an object: one that does not repeat lies around its middle.
+pub(super) fn laid(options: &Options, surface: &Surface, bounds: Option<(Size, bool)>) -> Laid {
+    let density = DENSITY / options.scale;
     let middle = bounds.map(|(size, _)| [size.width as f64 / 2.0, size.height as f64 / 2.0]);
-    let origin = match (&surface, bounds) {
+    let origin = match (surface, bounds) {
         (Surface::Endless, _) => {
             [options.size.width, options.size.height].map(|side| side as f64 / 2.0 / options.scale)
         }
@@ -66,14 +72,14 @@ pub(super) fn object(
         }
         _ => middle.unwrap_or_default(),
     };
-    let samples = if options.shape == Shape::Flat && options.scale == 1.0 { 1 } else { SAMPLES };
-    Ok(Object { surface, density, origin, samples })
+    let usual = if options.shape == Shape::Flat && options.scale == 1.0 { 1 } else { SAMPLES };
+    Laid { density, origin, samples: options.samples.unwrap_or(usual) }
 }
 
 /// How the camera stands.
-pub(super) fn view(options: &Options, object: &Object) -> View {
+pub(super) fn view(options: &Options, surface: &Surface) -> View {
     let chosen = options.camera;
-    let flat = matches!(object.surface, Surface::Endless);
+    let flat = matches!(surface, Surface::Endless);
     let eye = match &options.shape {
         Shape::Flat | Shape::Plane | Shape::Sphere => [0.0, 0.0, DISTANCE],
         Shape::Cylinder => [0.0, 1.5, 4.03],
@@ -89,7 +95,11 @@ pub(super) fn view(options: &Options, object: &Object) -> View {
     };
     View {
         eye: chosen.eye.unwrap_or(eye),
-        target: chosen.target.unwrap_or([0.0; 3]),
+        target: chosen.target.unwrap_or(if options.shape == Shape::Interior {
+            INTERIOR_MIDDLE
+        } else {
+            [0.0; 3]
+        }),
         up: chosen.up.unwrap_or([0.0, 1.0, 0.0]),
         fov_deg: chosen.fov_deg.unwrap_or(fov_deg),
         orthographic: chosen.orthographic || flat,

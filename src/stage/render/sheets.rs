@@ -6,7 +6,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::{Options, Report, lights, material, objects};
+use super::{Options, Report, beyond_note, lights, material, objects};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::baseline::{Exemplar, Tiles};
@@ -19,9 +19,11 @@ use crate::method::value::table::Table;
 use crate::picture::drawing::Canvas;
 use crate::picture::{Encoding, Picture};
 use crate::render::camera::Camera;
-use crate::render::texture::{Maker, Pieces, Texture};
+use crate::render::surface::Surface as Object;
+use crate::render::texture::{Maker, Texture};
 use crate::render::{Background, Scene};
 use crate::run::Context;
+use crate::run::budget::Room;
 use crate::run::progress::Counted;
 use crate::shape::{Area, Size};
 use crate::stage::fit;
@@ -53,6 +55,7 @@ struct Subject<'a> {
     values: TileValues,
     evaluator: Evaluator<Table>,
     options: &'a Options,
+    room: Room,
     context: &'a Context<'a>,
 }
 
@@ -72,15 +75,22 @@ pub fn compare(
     let sheet = Size::new(rows * (height + LINE + MARGIN) + MARGIN, COLUMNS * (width + MARGIN) + MARGIN);
     encoding.check_size(sheet)?;
     let pixels = (sheet.texels() as u64) * super::PIXEL_BYTES + encoding.memory_bytes(sheet);
-    context.require(&format!("a sheet of {sheet}"), pixels)?;
+    let mut room = Room::new(context.memory());
+    room.take(&format!("a sheet of {sheet}"), pixels)?;
+    let surface = objects::surface(options, &mut room, context)?;
+    let (lights, _) = lights(options, &surface, &mut room)?;
     let model = Model::open(&options.source)?;
     let values = TileValues::of_model(&model, By::Clusters, context)?;
-    let (evaluator, mut notes) = material::evaluator(values, pixels, context)?;
+    values.take(material::SPARE_BYTES, &mut room)?;
+    let (evaluator, mut notes) = values.into_evaluator(context)?;
     let values = TileValues::of_model(&model, By::Clusters, context)?;
-    let subject = Subject { model, values, evaluator, options, context };
+    let subject = Subject { model, values, evaluator, options, room, context };
+    let (background, shadows) = (Background::Grey(options.background), options.shadows);
+    let mut scene =
+        Scene { surface, lights, background, shadows, density: 1.0, origin: [0.0; 2], turn_rad: 0.0 };
     type Way<'a> = (&'static str, Box<dyn Fn() -> Result<Texture> + 'a>);
     let ways: [Way<'_>; 5] = [
-        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.values, Some(true))?.0))),
+        ("the tile repeated", Box::new(|| Ok(material::tile(&subject.values, Some(true), &room)?.0))),
         ("two tiles", Box::new(|| subject.two_tiles())),
         ("paper, 2D CAR", Box::new(|| subject.paper(CarKind::Car2d))),
         ("paper, 3D CAR", Box::new(|| subject.paper(CarKind::Car3d))),
@@ -88,7 +98,7 @@ pub fn compare(
             "coherent",
             Box::new(|| {
                 let which = options.plane.unwrap_or(PlaneOptions { seed: SEED as u32, jitter: None });
-                material::endless(&subject.model, &subject.values, which, context)
+                material::endless(&subject.model, &subject.values, which, &room, context)
             }),
         ),
     ];
@@ -96,8 +106,12 @@ pub fn compare(
     let mut count = 0;
     context.progress.begin("render", (ways.len() * height) as u64, Counted::Items("rows"));
     for (label, texture) in &ways {
-        let picture = match texture().and_then(|texture| subject.picture(options, &texture)) {
-            Ok(picture) => picture,
+        let picture = match texture().and_then(|texture| subject.picture(options, &mut scene, &texture)) {
+            Ok((picture, None)) => picture,
+            Ok((picture, Some(note))) => {
+                notes.push(format!("{label}: {note}"));
+                picture
+            }
             Err(error) if matches!(error.kind(), crate::ErrorKind::Missing | crate::ErrorKind::Usage) => {
                 notes.push(format!("{label}: left out: {error}"));
                 continue;
@@ -115,8 +129,9 @@ pub fn compare(
             .hint(notes.join("; ")));
     }
     let (top, left) = place(count, options.size);
-    canvas.text(top, left, "the tile, a pixel a texel");
-    let tile = exposed(subject.flat_tile()?, options.exposure);
+    canvas.text(top, left, "the tile, one pixel per texel");
+    scene.surface = Object::Endless;
+    let tile = exposed(subject.flat_tile(&mut scene)?, options.exposure);
     canvas.put(top + LINE, left, &tile.as_display());
     let made = super::write(&canvas.into_picture(), 1.0, output, encoding, context)?;
     Ok(Report { pictures: vec![(output.to_owned(), made)], size: sheet, notes })
@@ -134,38 +149,34 @@ fn exposed(mut picture: Picture, exposure: f64) -> Picture {
 }
 
 impl Subject<'_> {
-    /// The object, covered with a texture.
-    fn picture(&self, options: &Options, texture: &Texture) -> Result<Picture> {
+    /// The object, covered with a texture, and what there is to say of it.
+    fn picture(
+        &self,
+        options: &Options,
+        scene: &mut Scene,
+        texture: &Texture,
+    ) -> Result<(Picture, Option<String>)> {
         let bounds = match texture {
             Texture::Whole { size, wraps, .. } => Some((*size, *wraps)),
             Texture::Pieces(_) => None,
         };
-        let object = objects::object(options, bounds, self.context)?;
-        let camera = Camera::new(objects::view(options, &object), options.size)?;
-        let (lights, _) = lights(options)?;
-        let scene = Scene {
-            surface: object.surface,
-            lights,
-            background: Background::Grey(options.background),
-            shadows: options.shadows,
-            density: object.density,
-            origin: object.origin,
-            turn_rad: 0.0,
-        };
-        let samples = options.samples.unwrap_or(object.samples);
+        let samples;
+        objects::Laid { density: scene.density, origin: scene.origin, samples } =
+            objects::laid(options, &scene.surface, bounds);
+        let camera = Camera::new(objects::view(options, &scene.surface), options.size)?;
         let material = (&self.evaluator, texture);
-        let rendered = crate::render::render(&scene, &camera, material, options.size, samples, self.context)?;
-        Ok(rendered.picture)
+        let rendered = crate::render::render(scene, &camera, material, options.size, samples, self.context)?;
+        Ok((rendered.picture, rendered.beyond.then(|| beyond_note(options, bounds))))
     }
 
     /// As much of the tile as a panel holds.
-    fn flat_tile(&self) -> Result<Picture> {
-        let (texture, bounds) = material::tile(&self.values, None)?;
+    fn flat_tile(&self, scene: &mut Scene) -> Result<Picture> {
+        let (texture, bounds) = material::tile(&self.values, None, &self.room)?;
         let Size { height, width } = bounds.map_or(self.options.size, |(size, _)| size);
         let size = Size::new(height.min(self.options.size.height), width.min(self.options.size.width));
         let options = Options { shape: super::Shape::Flat, size, scale: 1.0, ..self.options.clone() };
         let options = Options { camera: super::CameraOptions::default(), samples: None, ..options };
-        self.picture(&options, &texture)
+        Ok(self.picture(&options, scene, &texture)?.0)
     }
 
     fn two_tiles(&self) -> Result<Texture> {
@@ -178,7 +189,7 @@ impl Subject<'_> {
             let texels = tiles.window(area.y, area.x, area.size);
             Ok(texels.into_iter().map(|texel| entries[texel as usize]).collect())
         });
-        Ok(Texture::Pieces(Pieces::new(make, None, self.context.work_bytes() / 4)))
+        Ok(material::pieces(make, None, &self.room))
     }
 
     /// A plane by the paper's rule, with a field that is fitted here.
@@ -188,7 +199,7 @@ impl Subject<'_> {
             of_stage(&self.model, Stage::Normals, Model::normals)?,
             of_stage(&self.model, Stage::Cluster, Model::index)?,
         );
-        self.context.require("fitting a random field", fit::memory_bytes(tile.size.texels()))?;
+        self.room.require("fitting a random field", fit::memory_bytes(tile.size.texels()))?;
         let boundary = if tile.wraps { Boundary::Periodic } else { Boundary::Mirrored };
         let chosen = field::Options { kind, levels: None, gains: Gains::Matched, boundary };
         let scan = Scan::new(index, &self.model.distance()?);

@@ -1,7 +1,7 @@
 //! A model: each stage that is done, its arrays against their ranges and against what they follow from.
 
 use super::report::{OLDEST_NOTE, Report, consolidated};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::store::model::components::ComponentsReport;
@@ -27,7 +27,12 @@ pub(super) fn run(model: &Model, context: &Context<'_>) -> Result<Report> {
         context.progress.advance(1);
     }
     context.progress.end();
-    if model.format() == OLDEST_FORMAT {
+    if !model.has(Stage::Tile)? {
+        // Its root holds a copy of all metadata from the first stage on.
+        let what = format!("{}: it was begun, and no stage of it is done", model.path().display());
+        let error = Error::missing(what).hint("run the command that makes this store again");
+        report.keep("tile", Err::<(), _>(error))?;
+    } else if model.format() == OLDEST_FORMAT {
         report.notes.push(OLDEST_NOTE.to_owned());
     } else {
         consolidated(model.path(), model.is_consolidated(), &mut report.findings)?;

@@ -10,6 +10,8 @@
 //!
 //! Values lie on the sRGB curve, on which 255 is white; see [`crate::color::curve`].
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Model, Stage};
@@ -17,6 +19,7 @@ use crate::error::Result;
 use crate::method::value::components::Components;
 use crate::run::recipe::Recipe;
 use crate::shape::Size;
+use crate::words::counted;
 use crate::zarr::Layout;
 
 /// What components depend on.
@@ -47,12 +50,32 @@ pub struct ComponentsReport {
     pub strengths: Vec<f64>,
     /// Squared error of all values, on the curve; none of those that were unpacked.
     pub squared_error: Option<f64>,
+    /// Samples of the tile that are no finite numbers: they count as black, also in the error.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub not_finite: u64,
     /// Peak signal-to-noise ratio on the curve, dB, as far as it is known.
     pub psnr_db: Option<f64>,
     /// Bytes of the arrays.
     pub bytes: u64,
     /// Bytes of the tile's samples in the measurement.
     pub tile_bytes: u64,
+    /// What a packed file said of itself that no array holds, such as its licence, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub texts: BTreeMap<String, String>,
+}
+
+fn is_none(count: &u64) -> bool {
+    *count == 0
+}
+
+impl ComponentsReport {
+    /// What a user should know of them, if there is anything.
+    pub fn note(&self) -> Option<String> {
+        let samples = counted(self.not_finite, "sample");
+        let is_told = self.not_finite > 0;
+        is_told
+            .then(|| format!("{samples} of the tile: no finite numbers, counted as black, also in the PSNR"))
+    }
 }
 
 /// Extents of the arrays.
@@ -173,9 +196,11 @@ impl Model {
             components,
             strengths: vec![],
             squared_error: None,
+            not_finite: 0,
             psnr_db: None,
             bytes: 0,
             tile_bytes: 0,
+            texts: BTreeMap::new(),
         };
         Ok(self.components_shape(&report)?.bytes())
     }

@@ -239,7 +239,7 @@ fn numbers_that_no_values_can_be_made_of_are_refused_by_whoever_meets_them_first
     }
     let file = forged(14, &(1e19f32).to_le_bytes());
     let error = unpack(&file).unwrap_err().to_string();
-    assert!(error.contains("expected finite numbers, of at most 1.8"), "{error}");
+    assert!(error.contains("expected finite numbers, of at most "), "{error}");
     // Components of the first section, behind the header and the length of the section.
     let header = 22 + u32::from_le_bytes(packed.bytes[18..22].try_into().unwrap()) as usize + 4;
     for count in [65u16, 65535] {

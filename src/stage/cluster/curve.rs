@@ -208,8 +208,8 @@ mod tests {
         };
         let chart = curve.chart();
         assert!(chart.title.starts_with("wood"));
-        let labels: Vec<&str> = chart.points.iter().map(|point| point.label.as_str()).collect();
+        let labels: Vec<&str> = chart.lines[0].iter().map(|point| point.label.as_str()).collect();
         assert_eq!(labels, ["1:1000", "1:10", "1:7.2"]);
-        assert_eq!(chart.points[2].y, 2.25);
+        assert_eq!(chart.lines[0][2].y, 2.25);
     }
 }

@@ -10,9 +10,9 @@ use crate::section::{Found, Section};
 use crate::spectrum::Transforms;
 use crate::stream::{Stream, Truth};
 
-/// One section: a file that is cut behind it is a model.
+/// What is known of a section: a file that is cut behind it is a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct SectionEnd {
     /// Byte where it ends.
     pub end: usize,
     /// Components up to it.
@@ -40,7 +40,7 @@ pub struct Unpacked {
     /// The model.
     pub model: Model,
     /// The sections that it was made of.
-    pub planes: Vec<Plane>,
+    pub planes: Vec<SectionEnd>,
     /// Sections that the file was written with.
     pub sections: usize,
     /// How it ends.
@@ -63,13 +63,15 @@ pub struct Outline {
     /// What else is said of the material: names and texts.
     pub texts: Vec<(String, String)>,
     /// The sections that are there.
-    pub planes: Vec<Plane>,
+    pub planes: Vec<SectionEnd>,
     /// Sections that the file was written with.
     pub sections: usize,
     /// How it ends.
     pub ending: Ending,
     /// Bytes of the file.
     pub bytes: usize,
+    /// Of these, bytes of the header, before the first section.
+    pub header_bytes: usize,
 }
 
 impl Outline {
@@ -103,8 +105,9 @@ impl Outline {
 /// A file in its parts, none of which is decoded.
 struct Parts<'a> {
     header: Header,
+    header_bytes: usize,
     sections: Vec<Section<'a>>,
-    planes: Vec<Plane>,
+    planes: Vec<SectionEnd>,
     ending: Ending,
 }
 
@@ -112,9 +115,10 @@ impl<'a> Parts<'a> {
     fn of(file: &'a [u8]) -> Result<Self> {
         let mut reader = Reader::new(file);
         let header = Header::read(&mut reader, file)?;
+        let header_bytes = reader.at();
         let brdf = header.views.len() * header.lights.len() * header.channels.len();
         let texels = header.size[0] * header.size[1];
-        let (mut sections, mut planes): (Vec<Section<'_>>, Vec<Plane>) = (vec![], vec![]);
+        let (mut sections, mut planes): (Vec<Section<'_>>, Vec<SectionEnd>) = (vec![], vec![]);
         let mut ending = Ending::Whole;
         for low in (0..header.sections).rev() {
             let start = reader.at();
@@ -133,7 +137,7 @@ impl<'a> Parts<'a> {
             expect_numbers(brdf, texels, section.components, file.len()).map_err(|error| error.at(start))?;
             let decibels = f64::from(section.centibels) / 100.0;
             let step = f64::from(header.step) * f64::from(1u32 << low);
-            planes.push(Plane { end: reader.at(), components: section.components, decibels, step });
+            planes.push(SectionEnd { end: reader.at(), components: section.components, decibels, step });
             sections.push(section);
         }
         if planes.is_empty() {
@@ -147,7 +151,7 @@ impl<'a> Parts<'a> {
             let found = format!("{} bytes behind the last section", reader.left());
             return Err(Error::new(found, "the end of the file").at(reader.at()));
         }
-        Ok(Self { header, sections, planes, ending })
+        Ok(Self { header, header_bytes, sections, planes, ending })
     }
 }
 
@@ -156,11 +160,11 @@ impl<'a> Parts<'a> {
 /// # Errors
 /// As [`unpack`], but for what only the numbers tell.
 pub fn outline(file: &[u8]) -> Result<Outline> {
-    let Parts { header, planes, ending, .. } = Parts::of(file)?;
+    let Parts { header, header_bytes, planes, ending, .. } = Parts::of(file)?;
     let sections = header.sections as usize;
     let Header { size, wraps, views, lights, channels, texts, .. } = header;
     let bytes = file.len();
-    Ok(Outline { size, wraps, views, lights, channels, texts, planes, sections, ending, bytes })
+    Ok(Outline { size, wraps, views, lights, channels, texts, planes, sections, ending, bytes, header_bytes })
 }
 
 /// Reads a packed model, as fine as its bytes allow.
@@ -173,7 +177,7 @@ pub fn outline(file: &[u8]) -> Result<Outline> {
 /// Where not even the first section is whole; sizes that such a file cannot mean; bytes behind the last section; numbers
 /// so large that no values can be made of them.
 pub fn unpack(file: &[u8]) -> Result<Unpacked> {
-    let Parts { header, sections, planes, ending } = Parts::of(file)?;
+    let Parts { header, sections, planes, ending, .. } = Parts::of(file)?;
     let transforms = Transforms::new(header.size, &header.views, &header.lights, header.channels.len());
     let mut stream = Stream::new(header.size, transforms.degrees(), header.channels.len(), header.planes);
     let texels = stream.image.values();

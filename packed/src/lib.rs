@@ -41,9 +41,9 @@ mod spectrum;
 mod stream;
 mod turn;
 
-pub use decode::{Ending, Outline, Plane, Unpacked, outline, unpack};
+pub use decode::{Ending, Outline, SectionEnd, Unpacked, outline, unpack};
 pub use encode::Packed;
 pub use error::{Error, Result};
 pub use header::{MAGIC, MOST_DIRECTIONS, MOST_SIDE};
-pub use model::{Component, Direction, Model};
+pub use model::{Component, Direction, LARGEST, LARGEST_OF_BASIS, Model};
 pub use search::{Target, pack};

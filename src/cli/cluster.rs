@@ -6,7 +6,7 @@ use btfkit::method::cluster::centre::CentreRule;
 use btfkit::method::cluster::lloyd::Limits;
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
-use btfkit::stage::cluster::{self, Amount, First, Step, Stepped};
+use btfkit::stage::cluster::{self, Amount, First, Representation, Step, Stepped};
 use btfkit::store::{measurement, model};
 use btfkit::words::counted;
 use clap::{Args, ValueEnum};
@@ -30,6 +30,9 @@ pub(super) struct ClusterOptions {
     /// What the centre of a cluster is
     #[arg(long, value_enum, default_value = "median")]
     centre: Centre,
+    /// What stands for the texels of a cluster
+    #[arg(long, value_enum, default_value = "texel")]
+    representatives: Representatives,
     /// Stop after this many passes over the texels
     #[arg(long, default_value_t = Limits::default().passes, value_parser = number::count)]
     passes: usize,
@@ -50,7 +53,7 @@ pub(super) struct ClusterOptions {
     #[arg(long, value_name = "SECONDS")]
     time: Option<u64>,
     /// Take the clusters of another model of this measurement, whose tile contains this one
-    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "passes", "tolerance", "first", "sample", "restarts", "time"])]
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["amount", "centre", "representatives", "passes", "tolerance", "first", "sample", "restarts", "time"])]
     clusters_of: Option<PathBuf>,
 }
 
@@ -60,6 +63,16 @@ enum Centre {
     Median,
     /// The mean, as in ordinary k-means
     Mean,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Representatives {
+    /// The measured texel nearest to the centre, as in the paper: all it shows was measured
+    Texel,
+    /// The mean of the cluster's texels: the least squared error, but softer
+    Mean,
+    /// Their median for each sample
+    Median,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -87,6 +100,7 @@ Examples:
   btf cluster wood.zarr wood.model.zarr --clusters 400
   btf cluster wood.zarr wood.model.zarr --error 1.5         as few clusters as leave this mean error
   btf cluster wood.zarr wood.model.zarr --ratio 200         200 times smaller than the measurement
+  btf cluster wood.zarr wood.model.zarr --representatives mean     a smaller squared error, softer pictures
   btf cluster wood.zarr second.model.zarr --clusters-of wood.model.zarr
 Cluster the whole plane once, and use its clusters for any tile that is cut from it:
   btf tile wood.zarr plane.model.zarr --tile none && btf cluster wood.zarr plane.model.zarr
@@ -230,6 +244,11 @@ pub(super) fn cluster_options(
         model: model.into(),
         amount,
         centre,
+        representatives: match options.representatives {
+            Representatives::Texel => Representation::Texel,
+            Representatives::Mean => Representation::Mean,
+            Representatives::Median => Representation::Median,
+        },
         limits,
         first: options.first.map(|first| match first {
             FirstName::Sample => First::Sample,

@@ -6,16 +6,19 @@ use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
+use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::compare::{By, Subject};
+use btfkit::stage::ledger::Ledger;
 use btfkit::stage::partial::Sharing;
-use btfkit::stage::{compare, image, pack};
+use btfkit::stage::{baselines, compare, image, pack};
+use btfkit::store::model::Model;
 use btfkit::store::{self, model};
 use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
 use super::table::{row, table};
-use super::{Console, as_json};
+use super::{Console, as_json, bytes_text};
 
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
@@ -23,6 +26,7 @@ use super::{Console, as_json};
 Examples:
   btf compare wood.zarr wood.model.zarr --picture side.png --light 15,0 --view 0,0
   btf compare wood.zarr wood.btfc --tile-of wood.model.zarr            a packed model
+  btf compare wood.zarr wood.model.zarr --baselines --curves curves.png
 Share the work between processes; the figures are those of one:
   btf compare wood.zarr wood.model.zarr --partial sums --shard 0/8     ... 7/8, in any order
   btf compare wood.zarr wood.model.zarr --partial sums --reduce        exit code 66 if a part is missing")]
@@ -47,6 +51,13 @@ pub(super) struct Compare {
     /// Of a packed model whose tile was cut: the model that it was packed from, which says where the tile lies
     #[arg(long, value_name = "MODEL")]
     tile_of: Option<PathBuf>,
+    /// Compare other ways to keep the tile, at their bytes and at those of packed files: clusters with means and medians,
+    /// PCA of all and of each view, polynomial texture maps. The model needs components (btf components). Takes minutes
+    #[arg(long, conflicts_with_all = ["picture", "by", "tile_of", "partial"])]
+    baselines: bool,
+    /// With --baselines, also draw the curves of error and bytes: .png, .jpg, .webp or .tif
+    #[arg(long, value_name = "FILE", requires = "baselines")]
+    curves: Option<PathBuf>,
     /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
     #[arg(long, value_name = "DIR")]
     partial: Option<PathBuf>,
@@ -76,7 +87,8 @@ impl Compare {
     }
 
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
-        self.picture.as_deref().map(|path| Ending::of(path, &Ending::DISPLAY)).transpose()?;
+        let pictures = self.picture.iter().chain(&self.curves);
+        pictures.map(|path| Ending::of(path, &Ending::DISPLAY)).collect::<Result<Vec<_>>>()?;
         // Both are read, so what they are tells which is which.
         let named = [&self.measurement, &self.model];
         let is_model =
@@ -91,6 +103,9 @@ impl Compare {
             }),
             tile_of: self.tile_of.clone(),
         };
+        if self.baselines {
+            return self.run_baselines(measurement, model, context, console);
+        }
         let subject = compare::open(&options, context)?;
         let by = subject.values.by();
         console.notes(subject.values.notes());
@@ -109,7 +124,10 @@ impl Compare {
             }
         };
         if self.json {
-            let value = as_json(&report)?;
+            let mut value = as_json(&report)?;
+            if let Some(members) = value.as_object_mut() {
+                members.insert("ledger".to_owned(), as_json(&subject.ledger)?);
+            }
             console.plan(&value)?;
         } else {
             let mut rows = vec![row!["view theta", "views", "mean |dL*|", "PSNR dB", "CIEDE2000", "95 %"]];
@@ -129,6 +147,7 @@ impl Compare {
                  count alike here; btf model and btf info weight them by the cosine of theta",
                 counted(report.colour_texels, "texel")
             ));
+            console.line(ledger_text(&subject.ledger));
             if by == By::Components {
                 console.line(match pack::is_packed(model) {
                     true => "by the components of the packed model",
@@ -158,6 +177,65 @@ impl Compare {
         Ok(())
     }
 
+    fn run_baselines(
+        &self,
+        measurement: &Path,
+        model: &Path,
+        context: &Context<'_>,
+        console: Console,
+    ) -> Result<()> {
+        let report =
+            baselines::run(&Model::open(model)?, &compare::open_measurement(model, measurement)?, context)?;
+        if let Some(path) = &self.curves {
+            report.chart(&model.display().to_string()).draw().write(path, context.existing)?;
+        }
+        if self.json {
+            return console.plan(&as_json(&report)?);
+        }
+        let mut rows = vec![row![
+            "method",
+            "setting",
+            "bytes",
+            "of the tile",
+            "mean |dL*|",
+            "PSNR dB",
+            "CIEDE2000",
+            "SSIM",
+            "sharpness"
+        ]];
+        for found in &report.rows {
+            let figures = &found.figures;
+            rows.push(row![
+                found.method,
+                found.setting,
+                found.bytes,
+                ratio_text(report.tile_bytes as f64 / found.bytes as f64),
+                format!("{:.3}", figures.lightness),
+                figures.psnr_db.map_or("equal".to_owned(), |psnr| format!("{psnr:.2}")),
+                format!("{:.3}", figures.ciede2000),
+                format!("{:.4}", figures.ssim),
+                format!("{:.3}", figures.sharpness)
+            ]);
+        }
+        console.text(&table(&rows));
+        console.line(format!(
+            "of the tile: the {} of its raw samples; bytes count all but the directions, which all need",
+            bytes_text(report.tile_bytes)
+        ));
+        let ahead = report.ahead();
+        if ahead.is_empty() {
+            console.line("packed files are ahead by PSNR at all of these bytes");
+        }
+        for row in ahead {
+            console.line(format!(
+                "{} {} is ahead of packed files by PSNR at its bytes",
+                row.method, row.setting
+            ));
+        }
+        console.notes(&report.notes);
+        Ok(())
+    }
+
     fn side_by_side(&self, subject: &Subject, context: &Context<'_>) -> Result<Picture> {
         let Subject { measurement, tile, values, .. } = subject;
         let measured = image::of_measured_tile(measurement, tile, self.view, self.light, context)?;
@@ -168,6 +246,24 @@ impl Compare {
             .map(|picture| picture.magnified(factor));
         Ok(captioned(&["measured", "model", "difference x 4"], &shown))
     }
+}
+
+/// What the values of a tile take, and of what that is a part.
+fn ledger_text(ledger: &Ledger) -> String {
+    let names: Vec<&str> = ledger.parts.iter().map(|part| part.name).collect();
+    let (raw, coded) = (ledger.raw_bytes(), ledger.coded_bytes());
+    let ratios =
+        |of: u64| [raw, coded].map(|bytes| ratio_text(of as f64 / bytes.max(1) as f64)).join(" and ");
+    format!(
+        "size: {}, {} as plain numbers and {} as stored; {} of the tile's raw {}, {} of the measurement's raw {}",
+        names.join(" + "),
+        bytes_text(raw),
+        bytes_text(coded),
+        ratios(ledger.tile_bytes),
+        bytes_text(ledger.tile_bytes),
+        ratios(ledger.measurement_bytes),
+        bytes_text(ledger.measurement_bytes)
+    )
 }
 
 /// Pictures of one size side by side, each under its caption.

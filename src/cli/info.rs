@@ -5,6 +5,7 @@ use btfkit::lattice::Lattice;
 use btfkit::names::ends_with;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
+use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::deepzoom::recipe::PyramidRecipe;
 use btfkit::stage::verify::is_pyramid;
 use btfkit::stage::{estimate, import, pack};
@@ -249,17 +250,21 @@ fn of_measurement(about: &Measured) -> Rows {
 
 fn of_packed(about: &pack::About) -> Rows {
     let ([width, height], [views, lights]) = (about.size, about.directions);
+    let ratio =
+        |of: u64| format!("the file is {} of them", ratio_text(of as f64 / about.bytes.max(1) as f64));
     let mut rows = vec![
         row!["kind", about.kind],
         row!["size", format!("{width}x{height}, {}", about.channels.join(" "))],
         row!["views", views],
         row!["lights", lights],
         row!["borders join", yes(about.wraps)],
-        row!["bytes", about.bytes],
+        row!["bytes", format!("{}, of these {} of the header", about.bytes, about.header_bytes)],
+        row!["as arrays of a model", format!("{}, {}", bytes_text(about.raw_bytes), ratio(about.raw_bytes))],
     ];
     if let Some(raw) = about.tile_bytes {
-        let ratio = raw as f64 / about.bytes.max(1) as f64;
-        rows.push(row!["the tile's samples", format!("{}, 1:{ratio:.0}", bytes_text(raw))]);
+        let text = format!("{}, {}", bytes_text(raw), ratio(raw));
+        let what = if about.whole_measurement { ", all of the measurement" } else { "" };
+        rows.push(row!["the tile's raw samples", format!("{text}{what}")]);
     }
     for (number, plane) in about.planes.iter().enumerate() {
         let quality =
@@ -271,6 +276,19 @@ fn of_packed(about: &pack::About) -> Rows {
     rows.extend(about.texts.iter().map(|(name, text)| row![name, text]));
     rows.extend(about.notes.iter().map(|note| row!["note", note]));
     rows
+}
+
+/// Bytes as a part of a tile and of a measurement.
+fn of_both(bytes: u64, tile: u64, measurement: u64) -> String {
+    let ratio = |of: u64| ratio_text(of as f64 / bytes.max(1) as f64);
+    format!(
+        "{}, {} of the tile's raw {}, {} of the measurement's raw {}",
+        bytes_text(bytes),
+        ratio(tile),
+        bytes_text(tile),
+        ratio(measurement),
+        bytes_text(measurement)
+    )
 }
 
 /// The word for what is or is not so.
@@ -336,11 +354,19 @@ fn of_model(about: &Modelled) -> Rows {
                     );
                     rows.push(row![format!("  pass {}", number + 1), found]);
                 }
-                for name in ["amount", "centre", "first", "sample", "restarts"] {
+                for name in ["amount", "centre", "representatives", "first", "sample", "restarts"] {
                     rows.extend(asked("cluster", name).map(|value| row![format!("  {name}"), value]));
                 }
                 rows.push(row!["  representatives", bytes_text(report.representative_bytes)]);
                 rows.push(row!["  index", bytes_text(report.index_bytes)]);
+                rows.push(row![
+                    "  both",
+                    of_both(
+                        report.representative_bytes + report.index_bytes,
+                        report.tile_bytes,
+                        report.measurement_bytes
+                    )
+                ]);
             }
             "normals" => {
                 let Some(report) = &about.normals else { continue };
@@ -367,7 +393,13 @@ fn of_model(about: &Modelled) -> Rows {
                 rows.push(row!["  components", report.components]);
                 rows.extend(report.note().map(|note| row!["  note", note]));
                 rows.extend(report.psnr_db.map(|psnr| row!["  PSNR", format!("{psnr:.2} dB")]));
-                rows.push(row!["  arrays", bytes_text(report.bytes)]);
+                let of = ratio_text(report.tile_bytes as f64 / report.bytes.max(1) as f64);
+                let text = format!(
+                    "{}, {of} of the tile's raw {}",
+                    bytes_text(report.bytes),
+                    bytes_text(report.tile_bytes)
+                );
+                rows.push(row!["  arrays", text]);
                 rows.extend(report.texts.iter().map(|(name, text)| row![format!("  {name}"), text]));
             }
             _ => {

@@ -237,6 +237,7 @@ fn analyse(
             model: model.clone(),
             amount: Amount::Clusters(settings.clusters),
             centre: CentreRule::Median,
+            representatives: cluster::Representation::Texel,
             first: None,
             sample: None,
             restarts: 1,

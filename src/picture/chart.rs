@@ -1,4 +1,4 @@
-//! A line chart on logarithmic axes: what halves and doubles lies on a straight line.
+//! A chart of lines on logarithmic axes: what halves and doubles lies on a straight line.
 
 use super::Picture;
 use super::drawing::{Canvas, INK, text_size};
@@ -29,9 +29,19 @@ const SERIES: [&[i32]; 4] = [
 ];
 
 const GRID: [f32; 3] = [0.88, 0.88, 0.9];
-const CURVE: [f32; 3] = [0.1, 0.35, 0.7];
 
-/// A chart of one line.
+/// Colours of the lines, over and over.
+const CURVES: [[f32; 3]; 7] = [
+    [0.1, 0.35, 0.7],
+    [0.8, 0.3, 0.1],
+    [0.1, 0.5, 0.3],
+    [0.55, 0.2, 0.6],
+    [0.6, 0.45, 0.0],
+    [0.3, 0.3, 0.3],
+    [0.8, 0.1, 0.45],
+];
+
+/// A chart of one line or several.
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// What is shown.
@@ -42,8 +52,8 @@ pub struct Chart {
     pub up: String,
     /// What the labels of points mean.
     pub labels: String,
-    /// The points from left to right. Those that no logarithm holds, of 0 or less, are left out.
-    pub points: Vec<Point>,
+    /// The points of each line from left to right. Those that no logarithm holds, of 0 or less, are left out.
+    pub lines: Vec<Vec<Point>>,
 }
 
 /// A point of a line.
@@ -113,7 +123,12 @@ impl Chart {
     /// The chart as a picture.
     pub fn draw(&self) -> Picture {
         let mut canvas = Canvas::new(SIZE);
-        let points: Vec<&Point> = self.points.iter().filter(|point| point.x > 0.0 && point.y > 0.0).collect();
+        let shown = |line: &'_ Vec<Point>| {
+            line.iter().filter(|point| point.x > 0.0 && point.y > 0.0).cloned().collect()
+        };
+        let lines: Vec<Vec<Point>> = self.lines.iter().map(shown).collect();
+        let mut points: Vec<&Point> = lines.iter().flatten().collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
         let (right, up) = (Self::right_axis(&points), Self::up_axis(&points));
         Self::draw_right_axis(&mut canvas, &right, &points);
         Self::draw_up_axis(&mut canvas, &up);
@@ -121,16 +136,15 @@ impl Chart {
             canvas.line([ROWS[row[0]], COLUMNS[column[0]]], [ROWS[row[1]], COLUMNS[column[1]]], 1, INK);
         }
         self.draw_names(&mut canvas);
-        let places: Vec<[usize; 2]> =
-            points.iter().map(|point| [up.at(point.y), right.at(point.x)]).collect();
-        for pair in places.windows(2) {
-            canvas.line(pair[0], pair[1], 2, CURVE);
+        let place = |point: &Point| [up.at(point.y), right.at(point.x)];
+        for (line, color) in lines.iter().zip(CURVES.into_iter().cycle()) {
+            for pair in line.windows(2) {
+                canvas.line(place(&pair[0]), place(&pair[1]), 2, color);
+            }
+            line.iter().for_each(|point| canvas.disc(place(point), 4, color));
         }
-        for &place in &places {
-            canvas.disc(place, 4, CURVE);
-        }
-        for (point, &place) in points.iter().zip(&places) {
-            draw_label(&mut canvas, place, &point.label);
+        for point in lines.iter().flatten() {
+            draw_label(&mut canvas, place(point), &point.label);
         }
         canvas.into_picture()
     }
@@ -225,7 +239,7 @@ mod tests {
 
     fn chart(points: Vec<Point>) -> Chart {
         let [title, right, up, labels] = ["title", "right", "up", "labels"].map(str::to_owned);
-        Chart { title, right, up, labels, points }
+        Chart { title, right, up, labels, lines: vec![points] }
     }
 
     fn point(x: f64, y: f64) -> Point {

@@ -2,6 +2,7 @@
 
 pub mod about;
 pub mod appearance;
+pub mod baselines;
 pub mod cluster;
 pub mod compare;
 pub mod components;
@@ -14,6 +15,7 @@ pub mod image;
 pub mod import;
 pub mod judge;
 pub(crate) mod kept;
+pub mod ledger;
 pub mod loss;
 pub mod normals;
 pub mod pack;

@@ -11,6 +11,7 @@ use crate::disk::output::{self, Made};
 use crate::error::{Error, Result};
 use crate::lattice::Lattice;
 use crate::method::tile::Tile;
+use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::Context;
 use crate::run::recipe::Recipe;
@@ -18,11 +19,13 @@ use crate::shape::Size;
 use crate::stage::compare::same_directions;
 use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
-use crate::store::model::components::{ComponentsRecipe, Found};
+use crate::store::model::components::{ComponentsRecipe, Found, raw_bytes};
 use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage, UNPACKED};
 pub use crate::store::packed::{ENDING, is_packed};
-use crate::store::packed::{LICENCE, MEASUREMENT, PackedFile, SAMPLES, TEXEL_MM, TRANSFER};
+use crate::store::packed::{
+    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
+};
 
 /// How small, or how good.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +101,15 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
     // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
     context.require("packing components", 5 * model.components_bytes()?)?;
-    let whole = unpacked_model(&model, options)?;
+    let mut whole = unpacked_model(&model)?;
+    whole.texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
+    whole.texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
+    // What the file said that the components were unpacked from, unless it is said anew.
+    for (name, text) in &report.texts {
+        if !whole.texts.iter().any(|(there, _)| there == name) {
+            whole.texts.push((name.clone(), text.clone()));
+        }
+    }
     if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
         return Err(Error::usage(format!(
             "{}: its components come from a packed file, so it is not known how far they are from the measurement",
@@ -140,8 +151,24 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     })
 }
 
+/// What the components of a model are after they were packed into at most so many bytes, and how many it took; none
+/// where that is too few for any file.
+pub(crate) fn packed_and_unpacked(
+    model: &Model,
+    bytes: u64,
+    context: &Context<'_>,
+) -> Result<Option<(Components, u64)>> {
+    let whole = unpacked_model(model)?;
+    let target = packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX));
+    let Ok(file) = context.compute(|| packed::pack(&whole, None, target)) else { return Ok(None) };
+    let length = file.bytes.len() as u64;
+    let file = PackedFile::of(model.path(), file.bytes)?;
+    let unpacked = file.model(context)?;
+    Ok(Some((OpenedFile::of(file, unpacked).components, length)))
+}
+
 /// The components of a model as the packer takes them.
-fn unpacked_model(model: &Model, options: &Options) -> Result<packed::Model> {
+fn unpacked_model(model: &Model) -> Result<packed::Model> {
     let components = model.components()?;
     let tile: TileReport = model.tile_report()?;
     let count = components.count();
@@ -163,15 +190,6 @@ fn unpacked_model(model: &Model, options: &Options) -> Result<packed::Model> {
     if tile.patch.is_none() {
         // Of a tile that is the whole measurement it can be told again which texel is which.
         texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
-    }
-    texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
-    texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
-    // What the file said that the components were unpacked from, unless it is said anew.
-    let said: ComponentsReport = model.report(Stage::Components)?;
-    for (name, text) in said.texts {
-        if !texts.iter().any(|(there, _)| *there == name) {
-            texts.push((name, text));
-        }
     }
     Ok(packed::Model {
         size: tile.size,
@@ -211,8 +229,14 @@ pub struct About {
     pub channels: Vec<String>,
     /// Bytes of the file.
     pub bytes: usize,
+    /// Of these, bytes of the header: sizes, directions, names and texts.
+    pub header_bytes: usize,
+    /// Bytes of the same components as a model keeps them.
+    pub raw_bytes: u64,
     /// Bytes of the tile's samples, where their type is said.
     pub tile_bytes: Option<u64>,
+    /// Whether the tile is all of the measurement.
+    pub whole_measurement: bool,
     /// What it can be cut to.
     pub planes: Vec<Plane>,
     /// What else is said.
@@ -228,10 +252,13 @@ pub struct About {
 pub fn about(path: &Path) -> Result<About> {
     let file = PackedFile::open(path)?;
     let (notes, samples) = (file.notes(), file.sample_type());
-    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, .. } = file.outline;
-    let brdf = views.len() * lights.len() * channels.len();
-    let values = (size[0] * size[1] * brdf) as u64;
-    let plane = |plane: &packed::Plane| Plane {
+    let whole_measurement = file.text(MEASUREMENT).is_some();
+    let components = file.outline.components();
+    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, header_bytes, .. } =
+        file.outline;
+    let (brdf, texels) = (views.len() * lights.len() * channels.len(), size[0] * size[1]);
+    let values = (texels * brdf) as u64;
+    let plane = |plane: &packed::SectionEnd| Plane {
         bytes: plane.end,
         components: plane.components,
         psnr_db: plane.decibels,
@@ -242,6 +269,9 @@ pub fn about(path: &Path) -> Result<About> {
         wraps,
         directions: [views.len(), lights.len()],
         bytes,
+        header_bytes,
+        raw_bytes: raw_bytes(components, brdf, texels),
+        whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),
         channels,

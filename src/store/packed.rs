@@ -43,7 +43,7 @@ pub(crate) fn of_packed(path: &Path, error: &packed::Error) -> Error {
 /// A packed model of which nothing is decoded yet.
 pub(crate) struct PackedFile {
     path: PathBuf,
-    file: MappedFile,
+    file: Box<dyn AsRef<[u8]> + Send + Sync>,
     pub(crate) outline: packed::Outline,
     /// What the samples of its tile are.
     pub(crate) description: Description,
@@ -59,11 +59,19 @@ impl PackedFile {
     /// not understood.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = MappedFile::open(path).map_err(|error| Error::io("open", path, error))?;
-        let bytes: &[u8] = file.as_ref();
+        Self::of(path, file)
+    }
+
+    /// Of the bytes of one; `path` stands in errors.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn of(path: &Path, file: impl AsRef<[u8]> + Send + Sync + 'static) -> Result<Self> {
+        let bytes = file.as_ref();
         let outline = packed::outline(bytes).map_err(|error| of_packed(path, &error))?;
         let description = description(path, &outline)?;
         let digest = recipe::digest_bytes(bytes);
-        Ok(Self { path: path.to_owned(), outline, description, digest, file })
+        Ok(Self { path: path.to_owned(), outline, description, digest, file: Box::new(file) })
     }
 
     /// Decodes it; the memory for it is there ([`packed::Outline::memory_bytes`]).
@@ -71,7 +79,8 @@ impl PackedFile {
     /// # Errors
     /// Numbers that no values can be made of.
     pub(crate) fn decode(&self) -> Result<packed::Model> {
-        let unpacked = packed::unpack(self.file.as_ref()).map_err(|error| of_packed(&self.path, &error))?;
+        let bytes = (*self.file).as_ref();
+        let unpacked = packed::unpack(bytes).map_err(|error| of_packed(&self.path, &error))?;
         Ok(unpacked.model)
     }
 
@@ -163,6 +172,8 @@ pub(crate) struct Packed {
     pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,
+    /// Bytes of the file.
+    pub(crate) file_bytes: u64,
     /// Memory that it took to open.
     pub(crate) memory_bytes: u64,
 }
@@ -182,25 +193,51 @@ impl Packed {
     pub(crate) fn of(file: PackedFile, from: packed::Model) -> Self {
         let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
         let measurement = file.text(MEASUREMENT).map(str::to_owned);
+        let file_bytes = file.outline.bytes as u64;
         let (description, digest) = (file.description, file.digest);
-        let count = from.components.len();
-        let turned = |of: fn(&packed::Component) -> &Vec<f64>, length: usize| {
-            let mut all = vec![0.0; length * count];
-            for (number, part) in from.components.iter().enumerate() {
-                let places = all.iter_mut().skip(number).step_by(count);
-                places.zip(of(part)).for_each(|(to, &value)| *to = value as f32);
-            }
-            all
-        };
+        let list =
+            |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
         let components = Components {
             size: description.size,
             brdf: [from.views.len(), from.lights.len()],
             mean: from.mean.iter().map(|&value| value as f32).collect(),
-            basis: turned(|part| &part.basis, from.brdf()),
-            coefficients: turned(|part| &part.coefficients, from.texels()),
+            basis: side_by_side(&list(|part| &part.basis), from.brdf()),
+            coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
             channels: from.channels,
         };
         let (wraps, texts) = (from.wraps, from.texts);
-        Self { components, description, wraps, digest, measurement, texts, notes, memory_bytes }
+        Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
+    }
+}
+
+/// Values of lists of one length, [place, list].
+fn side_by_side(lists: &[&Vec<f64>], length: usize) -> Vec<f32> {
+    /// Places that are written together, so that they stay in a cache.
+    const TOGETHER: usize = 64;
+    let count = lists.len();
+    let mut all = vec![0.0; length * count];
+    for (piece, to) in all.chunks_mut((TOGETHER * count).max(1)).enumerate() {
+        for (number, list) in lists.iter().enumerate() {
+            let values = &list[piece * TOGETHER..];
+            to.iter_mut().skip(number).step_by(count).zip(values).for_each(|(to, &value)| *to = value as f32);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_lie_side_by_side() {
+        for (count, length) in [(0, 5), (1, 1), (3, 200), (7, 64)] {
+            let lists: Vec<Vec<f64>> =
+                (0..count).map(|k| (0..length).map(|n| (1000 * k + n) as f64).collect()).collect();
+            let found = side_by_side(&lists.iter().collect::<Vec<_>>(), length);
+            let expected: Vec<f32> =
+                (0..length).flat_map(|n| (0..count).map(move |k| (1000 * k + n) as f32)).collect();
+            assert_eq!(found, expected);
+        }
     }
 }

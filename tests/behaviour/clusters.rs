@@ -301,3 +301,65 @@ fn time_that_is_over_ends_a_clustering_after_a_pass() {
         assert_eq!((report.passes.len(), report.ended), (1, Ended::Time));
     }
 }
+
+/// The errors of `btf compare`: mean |dL*| and PSNR.
+fn compared(measurement: &Path, model: &Path) -> [f64; 2] {
+    let told = succeed(btf().arg("compare").args([measurement, model]).arg("--json"));
+    let report: serde_json::Value = serde_json::from_str(&told).unwrap();
+    ["lightness", "psnr_db"].map(|name| report["all"][name].as_f64().unwrap())
+}
+
+#[test]
+fn means_and_medians_stand_for_clusters_whatever_the_samples_threads_and_steps() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for samples in ["u8", "f16"] {
+        let store = at(&format!("{samples}.zarr"));
+        succeed(btf().arg("import").args([&fixture().archive(), &store]).args(["--samples", samples]));
+        let model = |rule: &str, options: &[&str]| {
+            let model = at(&format!("{samples}-{rule}{}.model.zarr", options.concat()));
+            succeed(btf().arg("tile").args([&store, &model]));
+            let rule = ["--clusters", "20", "--representatives", rule];
+            succeed(btf().arg("cluster").args([&store, &model]).args(rule).args(options));
+            model
+        };
+        let [texel, mean, median] =
+            ["texel", "mean", "median"].map(|rule| compared(&store, &model(rule, &[])));
+        // Means have the least squared error, medians the least absolute one.
+        assert!(mean[1] > median[1] && median[1] > texel[1] + 0.5, "{texel:?} {mean:?} {median:?}");
+        assert!(median[0] < mean[0] && mean[0] < texel[0], "{texel:?} {mean:?} {median:?}");
+        // A mean is that of the stored samples of the cluster's texels.
+        let mean = model("mean", &["--threads", "3"]);
+        assert_same(&at(&format!("{samples}-mean.model.zarr")), &mean);
+        let passes = ["--sample", "300"];
+        let whole = model("mean", &passes);
+        let steps = at("steps.model.zarr");
+        succeed(btf().arg("tile").args([&store, &steps]));
+        let step = |step: &[&str]| {
+            let rule = ["--clusters", "20", "--representatives", "mean", "--sample", "300"];
+            succeed(btf().arg("cluster").args([&store, &steps]).args(rule).args(step))
+        };
+        step(&["--step", "prepare"]);
+        for _ in 0..60 {
+            step(&["--step", "assign", "--shard", "1/2"]);
+            step(&["--step", "assign", "--shard", "0/2"]);
+            if step(&["--step", "reduce"]).contains("clusters") {
+                break;
+            }
+        }
+        assert_same(&whole, &steps);
+        std::fs::remove_dir_all(&steps).unwrap();
+        succeed(btf().arg("verify").arg(&whole));
+        assert!(succeed(btf().arg("info").arg(&whole)).contains("representatives"));
+    }
+    let told = fail(
+        btf().arg("cluster").args([&at("u8.zarr"), &at("u8-mean.model.zarr")]).args([
+            "--clusters-of",
+            "x",
+            "--representatives",
+            "mean",
+        ]),
+        2,
+    );
+    assert!(told.contains("--representatives"), "{told}");
+}

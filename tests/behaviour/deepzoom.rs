@@ -374,7 +374,8 @@ fn what_is_to_be_done_about_missing_tiles_is_said_once() {
     let removed = tiles.take(4).map(|tile| std::fs::remove_file(tile.unwrap().path()).unwrap()).count();
     let found = btf().arg("verify").arg(&output).output().unwrap();
     assert_eq!(found.status.code(), Some(66));
-    let [told, error] = [found.stdout, found.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    let [told, error] =
+        [found.stdout, found.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
     assert_eq!(told.matches("no such tile").count(), removed, "{told}");
     assert_eq!([told, error].concat().matches("it goes on where it stopped").count(), 1);
 }

@@ -18,6 +18,26 @@ pub enum Amount {
     Ratio(f64),
 }
 
+/// What stands for the texels of a cluster.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Representation {
+    /// The measured texel nearest to the centre, as in the paper.
+    #[default]
+    Texel,
+    /// The mean of each stored sample.
+    Mean,
+    /// The lower median of each stored sample.
+    Median,
+}
+
+impl Representation {
+    /// Whether it is that of the paper.
+    pub(crate) fn is_texel(&self) -> bool {
+        *self == Self::Texel
+    }
+}
+
 /// Where the first centres of the passes over all texels come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -6,6 +6,7 @@ pub mod bounds;
 pub mod centre;
 pub mod choice;
 pub mod lloyd;
+pub(crate) mod middle;
 pub mod nearest;
 pub mod points;
 pub mod search;

@@ -86,6 +86,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         model: options.model.clone(),
         amount: Amount::Clusters(1),
         centre: options.centre,
+        representatives: crate::method::cluster::choice::Representation::Texel,
         limits: options.limits,
         first: None,
         sample: None,
@@ -164,7 +165,7 @@ impl Curve {
             right: "clusters n_c".to_owned(),
             up: "mean |dL*| from centres".to_owned(),
             labels: "1:N  representatives and index are N times smaller than the raw measurement".to_owned(),
-            points: points.collect(),
+            lines: vec![points.collect()],
         }
     }
 }
@@ -207,8 +208,8 @@ mod tests {
         };
         let chart = curve.chart();
         assert!(chart.title.starts_with("wood"));
-        let labels: Vec<&str> = chart.points.iter().map(|point| point.label.as_str()).collect();
+        let labels: Vec<&str> = chart.lines[0].iter().map(|point| point.label.as_str()).collect();
         assert_eq!(labels, ["1:1000", "1:10", "1:7.2"]);
-        assert_eq!(chart.points[2].y, 2.25);
+        assert_eq!(chart.lines[0][2].y, 2.25);
     }
 }

@@ -10,6 +10,7 @@ use crate::method::cluster::nearest::Near;
 use crate::run::progress::Counted;
 use crate::run::{Context, units};
 use crate::shape::{Size, Window};
+use crate::stage::cluster::representatives::Represented;
 use crate::stage::cluster::{Ended, PASSES, Plan, Report};
 use crate::store::clustering::{History, Passes};
 use crate::store::model::{Clusters, Representatives, Stage};
@@ -32,12 +33,12 @@ impl Plan {
         clustered.nearest.iter().map(|near| self.tile.source[near.texel as usize]).collect()
     }
 
-    /// Writes the arrays of the model, then how it went. `codes` are the vectors of the representatives, and
-    /// `from_representatives` is the sum of the distances of all texels from those of their clusters.
+    /// Writes the arrays of the model, then how it went. `from_representatives` is the sum of the distances of all texels
+    /// from the representatives of their clusters.
     pub(super) fn finish(
         &self,
         clustered: &Clustered,
-        codes: &[u8],
+        represented: Represented,
         from_representatives: u64,
         context: &Context<'_>,
     ) -> Result<Report> {
@@ -45,8 +46,8 @@ impl Plan {
         let Clustered { centres, index, nearest, history, .. } = clustered;
         let clusters = nearest.len();
         let sources = self.sources(clustered);
-        let representatives = self.read_representatives(&sources, context)?;
-        let codes = self.arrangement.plain(codes);
+        let Represented { representatives, vectors } = represented;
+        let codes = self.arrangement.plain(&vectors);
         let arrays = Clusters {
             size: self.tile.size,
             index: index.clone(),
@@ -62,7 +63,10 @@ impl Plan {
         index.iter().for_each(|&cluster| population[usize::from(cluster)] += 1);
         let texels = self.selection.texels();
         let lightness = |distance: u64| self.arrangement.mean_lightness(distance);
-        let from_centres: Vec<f64> = nearest.iter().map(|near| lightness(near.distance)).collect();
+        let (stride, kernel) = (self.arrangement.stride(), self.method(0, None).kernel);
+        let pairs = vectors.chunks_exact(stride).zip(centres.chunks_exact(stride));
+        let apart = pairs.map(|(a, b)| kernel.row_distances(a, [b], self.arrangement.groups())[0]);
+        let from_centres: Vec<f64> = apart.map(lightness).collect();
         let report = Report {
             clusters,
             passes: history.passes.clone(),
@@ -105,7 +109,11 @@ impl Plan {
     }
 
     /// The colour BRDFs of texels at these rows and columns of the measurement, [cluster, view, light, channel].
-    fn read_representatives(&self, sources: &[[u32; 2]], context: &Context<'_>) -> Result<Representatives> {
+    pub(super) fn read_representatives(
+        &self,
+        sources: &[[u32; 2]],
+        context: &Context<'_>,
+    ) -> Result<Representatives> {
         let description = self.measurement.description();
         let (views, texel) = (description.views.len(), description.texel_samples());
         let numbers: Vec<usize> = (0..views).collect();

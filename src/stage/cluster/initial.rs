@@ -25,17 +25,16 @@ impl Plan {
         let points = self.read_sample(context)?;
         let method = self.method(budget.sample_columns, deadline);
         let (clustering, trials) = self.cluster_points(&points, budget.clusters, method, context)?;
-        let texels: Vec<u32> = clustering.nearest.iter().map(|near| near.texel).collect();
-        let representatives = points.vectors_of(&texels);
-        let centres =
-            Centres { arrangement: &self.arrangement, vectors: &representatives, kernel: method.kernel };
-        let from_representatives =
-            context.install(|| total_distance(&points.vectors, &clustering.index, &centres));
-        drop(points);
         let Clustering { centres, index, nearest, passes } = clustering;
         let history = History { passes, trials, ..History::default() };
         let clustered = Clustered { centres, index, nearest, history };
-        self.finish(&clustered, &representatives, from_representatives, context)
+        let represented = self.represent(&clustered, context)?;
+        let centres =
+            Centres { arrangement: &self.arrangement, vectors: &represented.vectors, kernel: method.kernel };
+        let from_representatives =
+            context.install(|| total_distance(&points.vectors, &clustered.index, &centres));
+        drop(points);
+        self.finish(&clustered, represented, from_representatives, context)
     }
 
     /// What the first pass over all texels begins with.

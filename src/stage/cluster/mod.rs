@@ -10,6 +10,7 @@ pub mod curve;
 mod finish;
 mod initial;
 mod pass;
+mod representatives;
 mod reuse;
 mod stream;
 
@@ -21,7 +22,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::method::cluster::centre::CentreRule;
-pub use crate::method::cluster::choice::{Amount, First};
+pub use crate::method::cluster::choice::{Amount, First, Representation};
 use crate::method::cluster::lloyd::{Limits, Method, Pass};
 use crate::method::cluster::points::Arrangement;
 use crate::method::cluster::selection::{Order, Selection};
@@ -65,6 +66,8 @@ pub struct Options {
     pub amount: Amount,
     /// How centres follow from their texels.
     pub centre: CentreRule,
+    /// What stands for the texels of a cluster.
+    pub representatives: Representation,
     /// When to stop.
     pub limits: Limits,
     /// Where first centres come from. Where absent, all texels of a tile of no more than a sample, else
@@ -82,13 +85,14 @@ pub struct Options {
 }
 
 impl Options {
-    /// 256 clusters, or as many as the tile has texels, with medians as centres; seed 1.
+    /// 256 clusters, or as many as the tile has texels, with medians as centres and texels as representatives; seed 1.
     pub fn new(measurement: impl Into<PathBuf>, model: impl Into<PathBuf>) -> Self {
         Self {
             measurement: measurement.into(),
             model: model.into(),
             amount: Amount::Usual,
             centre: CentreRule::Median,
+            representatives: Representation::Texel,
             limits: Limits::default(),
             first: None,
             sample: None,
@@ -256,6 +260,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         restarts: options.restarts,
         seed: options.seed,
         first: options.first,
+        representatives: options.representatives,
     };
     let recipe = recipe.to_value()?;
     let first = options.first.unwrap_or(First::Sample);

@@ -166,9 +166,9 @@ impl Work<'_> {
     /// What they leave takes the texels once more: only now are they known.
     pub(super) fn finish(&mut self, clustered: &Clustered, context: &Context<'_>) -> Result<End> {
         let Plan { arrangement, selection, .. } = self.plan;
-        let vectors = self.plan.read_vectors(&self.plan.sources(clustered), context)?;
+        let represented = self.plan.represent(clustered, context)?;
         let kernel = self.plan.method(0, None).kernel;
-        let representatives = Centres { arrangement, vectors: &vectors, kernel };
+        let representatives = Centres { arrangement, vectors: &represented.vectors, kernel };
         let blocks = 0..selection.blocks().len();
         context.progress.begin("representatives", selection.texels() as u64, Counted::Items("texels"));
         let mut total = 0;
@@ -184,7 +184,7 @@ impl Work<'_> {
             Some(history) => Ok(End::TooLarge(Box::new(history))),
             None => self
                 .plan
-                .finish(clustered, &vectors, total, context)
+                .finish(clustered, represented, total, context)
                 .map(|report| End::Model(Box::new(report))),
         }
     }

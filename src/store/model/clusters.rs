@@ -11,7 +11,7 @@ use super::{Model, Stage};
 use crate::color::{Decoder, Transfer};
 use crate::error::{Error, Result};
 use crate::method::cluster::centre::CentreRule;
-use crate::method::cluster::choice::{Amount, First};
+use crate::method::cluster::choice::{Amount, First, Representation};
 use crate::method::cluster::lloyd::{Limits, Pass};
 use crate::method::cluster::search::Trial;
 use crate::run::recipe::Recipe;
@@ -40,7 +40,8 @@ pub struct Clusters {
     pub centres: Vec<u8>,
     /// Measured colour BRDFs.
     pub representatives: Representatives,
-    /// Row and column in the measurement of each representative.
+    /// Row and column in the measurement of the texel nearest to each centre: of the representative, unless that is a
+    /// mean or a median.
     pub sources: Vec<[u32; 2]>,
     /// D of (26), row by row.
     pub distance: Vec<f32>,
@@ -64,7 +65,7 @@ pub fn index_bytes(texels: usize, clusters: usize) -> u64 {
     texels as u64 * if clusters <= NARROW { 1 } else { 2 }
 }
 
-/// Measured colour BRDFs, one a cluster.
+/// Colour BRDFs, one a cluster: measured ones, or means or medians of them.
 pub struct Representatives {
     /// Clusters, views, lights, channels.
     pub shape: [usize; 4],
@@ -110,6 +111,9 @@ pub(crate) struct ClusterRecipe {
     /// Where first centres come from, where given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first: Option<First>,
+    /// What stands for the texels of a cluster.
+    #[serde(default, skip_serializing_if = "Representation::is_texel")]
+    pub representatives: Representation,
 }
 
 impl Recipe for ClusterRecipe {

@@ -48,5 +48,5 @@ pub use decode::{Ending, Outline, SectionEnd, Unpacked, outline, unpack};
 pub use encode::Packed;
 pub use error::{Error, Result};
 pub use header::{MAGIC, MOST_DIRECTIONS, MOST_SIDE};
-pub use model::{Component, Direction, Model};
+pub use model::{Component, Direction, LARGEST, LARGEST_OF_BASIS, Model};
 pub use search::{Target, pack};

@@ -2,10 +2,12 @@
 
 use crate::error::{Error, Result};
 
-/// The largest numbers that are read or written: of a mean and of coefficients, and of bases. Values that are sums of
-/// their products stay finite in 32 bits.
-const LARGEST: f64 = (1u128 << 64) as f64;
-const LARGEST_OF_BASIS: f64 = (1u64 << 32) as f64;
+/// The largest number of a mean or of coefficients that is read or written. Values that are sums of products stay finite
+/// in 32 bits.
+pub const LARGEST: f64 = (1u128 << 64) as f64;
+
+/// The same of bases.
+pub const LARGEST_OF_BASIS: f64 = (1u64 << 32) as f64;
 
 /// A direction in degrees: polar angle from the normal, and azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]

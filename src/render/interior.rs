@@ -4,9 +4,10 @@
 //! hoods off it, and its sides curl inwards. Texture coordinates are lengths along profile and width, so that the
 //! material has the same size everywhere.
 
-use super::corner::Corner;
+use super::corner::{Corner, expect_triangles};
 use super::mesh::Mesh;
 use crate::error::Result;
+use crate::run::budget::Room;
 use crate::vector::{Vector, along, cross, length, minus, unit};
 
 /// Points along a profile, and across.
@@ -112,14 +113,18 @@ fn smooth(from: f64, to: f64, at: f64) -> f64 {
     share * share * (3.0 - 2.0 * share)
 }
 
-/// The object.
+/// The object; what stays in memory is taken of the room.
 ///
 /// # Errors
-/// None that its formula could cause.
-pub fn mesh() -> Result<Mesh> {
+/// Where there is no room for it.
+pub fn mesh(room: &mut Room) -> Result<Mesh> {
     let sheets = [SEAT, HEADREST, DASHBOARD];
-    let corners = sheets.iter().flat_map(Sheet::corners).collect();
-    Mesh::new(corners)
+    expect_triangles(room, sheets.len() * 2 * ALONG * ACROSS)?;
+    let mut corners = Vec::with_capacity(sheets.len() * 2 * ALONG * ACROSS);
+    sheets.iter().for_each(|sheet| corners.extend(sheet.corners()));
+    let mesh = Mesh::new(corners)?;
+    room.take("the interior", mesh.bytes())?;
+    Ok(mesh)
 }
 
 impl Sheet {

@@ -23,10 +23,12 @@ struct Triangle {
     node: usize,
 }
 
-/// Memory of a triangle: as it is read, as it is asked for, and two nodes of the tree. Corners are gone when the tree is
-/// built, which makes up for the lists that its builder sorts triangles into.
-pub(super) const TRIANGLE_BYTES: u64 =
-    (size_of::<[Corner; 3]>() + size_of::<Triangle>() + 2 * size_of::<BvhNode<f64, 3>>()) as u64;
+/// Memory of a triangle at most: as it is asked for, beside its corners as they were read, or beside two nodes of the
+/// tree and a place in the lists that the tree's builder sorts.
+pub(super) const TRIANGLE_BYTES: u64 = {
+    let (corners, nodes) = (size_of::<[Corner; 3]>(), 2 * size_of::<BvhNode<f64, 3>>() + 32);
+    (size_of::<Triangle>() + if corners > nodes { corners } else { nodes }) as u64
+};
 
 /// Triangles in a tree, scaled and moved so that they just fit the sphere of radius 1 around the origin.
 pub struct Mesh {

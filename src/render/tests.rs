@@ -418,7 +418,7 @@ fn an_environment_beyond_memory_is_refused_before_it_is_decoded() {
 
 #[test]
 fn the_interior_has_a_front_and_its_texture_one_size() {
-    let mesh = Surface::Mesh(interior::mesh().unwrap());
+    let mesh = Surface::Mesh(interior::mesh(&mut Room::new(Allowance::new(256 << 20))).unwrap());
     let eye = [0.4, 1.2, 4.0];
     let mut seen = 0;
     for n in 0..900 {

@@ -83,7 +83,7 @@ pub(crate) fn unit_bytes(description: &Description, source: &dyn Source) -> u64 
 /// Looks at the whole archive without decoding it, and fixes the recipe.
 pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>) -> Result<Plan<'a>> {
     let description = describe(source, options.white);
-    description.decoder()?;
+    description.decoder().map_err(|error| error.context(source.path().display()))?;
     let contents = source.contents();
     let recipe = ImportRecipe {
         format: contents.format.clone(),

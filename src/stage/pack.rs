@@ -24,7 +24,7 @@ use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage, UNPACKED};
 pub use crate::store::packed::{ENDING, is_packed};
 use crate::store::packed::{
-    LICENCE, MEASUREMENT, PackedFile, SAMPLES, TEXEL_MM, TRANSFER, components_of, of_packed,
+    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
 };
 
 /// How small, or how good.
@@ -101,9 +101,15 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         of_stage(&model, Stage::Components, |model| model.report(Stage::Components))?;
     // In f32 as they are read, then in f64 twice, beside whole numbers and what is known of them.
     context.require("packing components", 5 * model.components_bytes()?)?;
-    let licence = options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone()));
-    let texel_mm = options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string()));
-    let whole = unpacked_model(&model, licence.chain(texel_mm).collect())?;
+    let mut whole = unpacked_model(&model)?;
+    whole.texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
+    whole.texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
+    // What the file said that the components were unpacked from, unless it is said anew.
+    for (name, text) in &report.texts {
+        if !whole.texts.iter().any(|(there, _)| there == name) {
+            whole.texts.push((name.clone(), text.clone()));
+        }
+    }
     if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
         return Err(Error::usage(format!(
             "{}: its components come from a packed file, so it is not known how far they are from the measurement",
@@ -152,15 +158,17 @@ pub(crate) fn packed_and_unpacked(
     bytes: u64,
     context: &Context<'_>,
 ) -> Result<Option<(Components, u64)>> {
-    let whole = unpacked_model(model, vec![])?;
+    let whole = unpacked_model(model)?;
     let target = packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX));
     let Ok(file) = context.compute(|| packed::pack(&whole, None, target)) else { return Ok(None) };
-    let unpacked = packed::unpack(&file.bytes).map_err(|error| of_packed(model.path(), &error))?;
-    Ok(Some((components_of(&unpacked.model), file.bytes.len() as u64)))
+    let length = file.bytes.len() as u64;
+    let file = PackedFile::of(model.path(), file.bytes)?;
+    let unpacked = file.model(context)?;
+    Ok(Some((OpenedFile::of(file, unpacked).components, length)))
 }
 
-/// The components of a model as the packer takes them, with what is said of them anew.
-fn unpacked_model(model: &Model, said_anew: Vec<(String, String)>) -> Result<packed::Model> {
+/// The components of a model as the packer takes them.
+fn unpacked_model(model: &Model) -> Result<packed::Model> {
     let components = model.components()?;
     let tile: TileReport = model.tile_report()?;
     let count = components.count();
@@ -182,14 +190,6 @@ fn unpacked_model(model: &Model, said_anew: Vec<(String, String)>) -> Result<pac
     if tile.patch.is_none() {
         // Of a tile that is the whole measurement it can be told again which texel is which.
         texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
-    }
-    texts.extend(said_anew);
-    // What the file said that the components were unpacked from, unless it is said anew.
-    let said: ComponentsReport = model.report(Stage::Components)?;
-    for (name, text) in said.texts {
-        if !texts.iter().any(|(there, _)| *there == name) {
-            texts.push((name, text));
-        }
     }
     Ok(packed::Model {
         size: tile.size,
@@ -255,7 +255,7 @@ pub fn about(path: &Path) -> Result<About> {
     let file = PackedFile::open(path)?;
     let (notes, samples) = (file.notes(), file.sample_type());
     let whole_measurement = file.text(MEASUREMENT).is_some();
-    let raw_components = file.outline.components();
+    let components = file.outline.components();
     let packed::Outline {
         size,
         wraps,
@@ -269,8 +269,8 @@ pub fn about(path: &Path) -> Result<About> {
         centres,
         ..
     } = file.outline;
-    let brdf = views.len() * lights.len() * channels.len();
-    let values = (size[0] * size[1] * brdf) as u64;
+    let (brdf, texels) = (views.len() * lights.len() * channels.len(), size[0] * size[1]);
+    let values = (texels * brdf) as u64;
     let plane = |plane: &packed::SectionEnd| Section {
         bytes: plane.end,
         components: plane.components,
@@ -284,7 +284,7 @@ pub fn about(path: &Path) -> Result<About> {
         bytes,
         header_bytes,
         centres,
-        raw_bytes: raw_bytes(raw_components, brdf, size[0] * size[1]),
+        raw_bytes: raw_bytes(components, brdf, texels),
         whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),
         planes: planes.iter().map(plane).collect(),

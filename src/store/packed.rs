@@ -43,7 +43,7 @@ pub(crate) fn of_packed(path: &Path, error: &packed::Error) -> Error {
 /// A packed model of which nothing is decoded yet.
 pub(crate) struct PackedFile {
     path: PathBuf,
-    file: MappedFile,
+    file: Box<dyn AsRef<[u8]> + Send + Sync>,
     pub(crate) outline: packed::Outline,
     /// What the samples of its tile are.
     pub(crate) description: Description,
@@ -59,11 +59,19 @@ impl PackedFile {
     /// not understood.
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = MappedFile::open(path).map_err(|error| Error::io("open", path, error))?;
-        let bytes: &[u8] = file.as_ref();
+        Self::of(path, file)
+    }
+
+    /// Of the bytes of one; `path` stands in errors.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub(crate) fn of(path: &Path, file: impl AsRef<[u8]> + Send + Sync + 'static) -> Result<Self> {
+        let bytes = file.as_ref();
         let outline = packed::outline(bytes).map_err(|error| of_packed(path, &error))?;
         let description = description(path, &outline)?;
         let digest = recipe::digest_bytes(bytes);
-        Ok(Self { path: path.to_owned(), outline, description, digest, file })
+        Ok(Self { path: path.to_owned(), outline, description, digest, file: Box::new(file) })
     }
 
     /// Decodes it; the memory for it is there ([`packed::Outline::memory_bytes`]).
@@ -71,7 +79,8 @@ impl PackedFile {
     /// # Errors
     /// Numbers that no values can be made of.
     pub(crate) fn decode(&self) -> Result<packed::Model> {
-        let unpacked = packed::unpack(self.file.as_ref()).map_err(|error| of_packed(&self.path, &error))?;
+        let bytes = (*self.file).as_ref();
+        let unpacked = packed::unpack(bytes).map_err(|error| of_packed(&self.path, &error))?;
         Ok(unpacked.model)
     }
 
@@ -184,23 +193,20 @@ impl Packed {
     pub(crate) fn of(file: PackedFile, from: packed::Model) -> Self {
         let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
         let measurement = file.text(MEASUREMENT).map(str::to_owned);
-        let (digest, file_bytes) = (file.digest, file.outline.bytes as u64);
-        let (wraps, texts) = (from.wraps, from.texts.clone());
-        let (description, components) = (file.description, components_of(&from));
+        let file_bytes = file.outline.bytes as u64;
+        let (description, digest) = (file.description, file.digest);
+        let list =
+            |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
+        let components = Components {
+            size: description.size,
+            brdf: [from.views.len(), from.lights.len()],
+            mean: from.mean.iter().map(|&value| value as f32).collect(),
+            basis: side_by_side(&list(|part| &part.basis), from.brdf()),
+            coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
+            channels: from.channels,
+        };
+        let (wraps, texts) = (from.wraps, from.texts);
         Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
-    }
-}
-
-/// The components of a packed model as they are evaluated.
-pub(crate) fn components_of(from: &packed::Model) -> Components {
-    let list = |of: fn(&packed::Component) -> &Vec<f64>| from.components.iter().map(of).collect::<Vec<_>>();
-    Components {
-        size: Size::new(from.size[0], from.size[1]),
-        brdf: [from.views.len(), from.lights.len()],
-        mean: from.mean.iter().map(|&value| value as f32).collect(),
-        basis: side_by_side(&list(|part| &part.basis), from.brdf()),
-        coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
-        channels: from.channels.clone(),
     }
 }
 

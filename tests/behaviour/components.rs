@@ -207,3 +207,132 @@ fn a_packed_file_is_told_of_cut_and_never_trusted() {
     }
     assert!(!at("none.model.zarr").exists());
 }
+
+/// A measurement of floats by the fixture's archive, some of whose samples are changed, and a model with its tile.
+fn of_floats(folder: &Path, transfer: &str, change: impl Fn(&mut [[u8; 4]])) -> [PathBuf; 2] {
+    let at = |name: &str| folder.join(format!("{name}-{transfer}.zarr"));
+    let [floats, store, model] = [at("f"), at("m"), at("model")];
+    let npy = folder.join(format!("f-{transfer}.npy"));
+    let reading = ["--samples", "f32", "--transfer", transfer];
+    succeed(btf().arg("import").args([&fixture().archive(), &floats]).args(reading));
+    succeed(btf().arg("export").args([&floats, &npy]));
+    let mut bytes = std::fs::read(&npy).unwrap();
+    let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    change(bytes[header..].as_chunks_mut::<4>().0);
+    std::fs::write(&npy, bytes).unwrap();
+    succeed(btf().arg("import").args([&npy, &store]).args(["--transfer", transfer, "--force"]));
+    succeed(btf().arg("tile").args([&store, &model]).args(["--tile", "none"]));
+    [store, model]
+}
+
+#[test]
+fn samples_that_components_do_not_hold_are_refused_or_told() {
+    for (transfer, large) in [("srgb", 1e6f32), ("linear", 1e12), ("srgb", -1e6), ("linear", -1e12)] {
+        let folder = tempfile::tempdir().unwrap();
+        let [store, model] = of_floats(folder.path(), transfer, |samples| {
+            (samples[5], samples[5000]) = (large.to_le_bytes(), large.to_le_bytes());
+        });
+        let told = fail(btf().arg("components").args([&store, &model]), 65);
+        assert!(
+            told.contains("2 samples beyond") && told.contains("btf cluster"),
+            "{transfer} {large}: {told}"
+        );
+        let told = fail(btf().arg("pack").args([&model, &folder.path().join("m.btfc")]), 66);
+        assert!(told.contains("btf components"), "{told}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let [store, model] = of_floats(folder.path(), "linear", |samples| {
+        (samples[5], samples[50], samples[60]) =
+            (f32::NAN.to_le_bytes(), f32::INFINITY.to_le_bytes(), 1e9f32.to_le_bytes());
+    });
+    let told = succeed(btf().arg("components").args([&store, &model]));
+    assert!(told.contains("2 samples of the tile: no finite numbers, counted as black"), "{told}");
+    let told = succeed(btf().arg("info").arg(&model));
+    assert!(told.contains("2 samples of the tile: no finite numbers"), "{told}");
+    succeed(btf().arg("verify").arg(&model));
+}
+
+/// Puts the right checksum on the header of a packed file, whose last section is cut off.
+fn with_header(bytes: &[u8], change: impl Fn(&mut [u8])) -> Vec<u8> {
+    let end = 22 + u32::from_le_bytes(bytes[18..22].try_into().unwrap()) as usize;
+    let mut bytes = bytes.to_vec();
+    change(&mut bytes[..end]);
+    let checksum = crc32fast::hash(&bytes[..end]);
+    bytes[end..end + 4].copy_from_slice(&checksum.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn whoever_opens_a_packed_file_gives_the_same_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [_, model] = model(folder.path(), &[], &[]);
+    succeed(btf().arg("pack").args([&model, &at("m.btfc")]).args(["--quality", "30kB"]));
+    let bytes = std::fs::read(at("m.btfc")).unwrap();
+    let red = bytes.windows(6).position(|six| six == b"\x01R\x01G\x01B").unwrap();
+    let forged = at("forged.btfc");
+    let header: [(&str, Box<dyn Fn(&mut [u8])>); 3] = [
+        ("a step of 3", Box::new(|head: &mut [u8]| head[14..18].copy_from_slice(&f32::MAX.to_le_bytes()))),
+        ("channel", Box::new(move |head: &mut [u8]| head[red + 1] = b'Q')),
+        ("1 to 256 channels", Box::new(|head: &mut [u8]| head[12..14].fill(255))),
+    ];
+    let commands = |file: &Path| {
+        let with = |arguments: &[&str], output: Option<&str>| {
+            let mut command = btf();
+            command.arg(arguments[0]).arg(file).args(&arguments[1..]);
+            command.args(output.map(at));
+            command
+        };
+        [
+            with(&["info"], None),
+            with(&["unpack"], Some("forged.model.zarr")),
+            with(&["image", "--out"], Some("forged.png")),
+            with(&["render", "--out"], Some("forged.png")),
+            with(&["import"], Some("forged.zarr")),
+        ]
+    };
+    for (told, change) in header {
+        std::fs::write(&forged, with_header(&bytes, change)).unwrap();
+        for mut command in commands(&forged) {
+            let said = fail(&mut command, 65);
+            assert!(said.contains(told) && said.contains("forged.btfc"), "{command:?}: {said}");
+        }
+    }
+    // A step that only its numbers make too large: what decodes it says so, and leaves nothing.
+    let large = |head: &mut [u8]| head[14..18].copy_from_slice(&1e19f32.to_le_bytes());
+    std::fs::write(&forged, with_header(&bytes, large)).unwrap();
+    for mut command in commands(&forged).into_iter().skip(1).take(3) {
+        let said = fail(&mut command, 65);
+        assert!(said.contains("expected finite numbers, of at most"), "{command:?}: {said}");
+    }
+    assert!(!at("forged.model.zarr").exists() && !at("forged.png").exists());
+    // What takes more memory than is allowed is told before it is decoded; what it is is told without.
+    for mut command in commands(&at("m.btfc")).into_iter().skip(1) {
+        let said = fail(command.args(["--memory", "13MiB"]), 2);
+        assert!(said.contains("MiB, or more, allows it"), "{command:?}: {said}");
+    }
+    succeed(btf().arg("info").arg(at("m.btfc")).args(["--memory", "13MiB"]));
+}
+
+#[test]
+fn a_model_whose_unpacking_was_killed_is_not_whole_and_not_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [_, model] = model(folder.path(), &[], &[]);
+    succeed(btf().arg("pack").args([&model, &at("m.btfc")]).args(["--quality", "30kB"]));
+    let again = at("again.model.zarr");
+    succeed(btf().arg("unpack").args([&at("m.btfc"), &again]));
+    let whole = tree(&again);
+    // As a kill leaves it before its first stage is done.
+    let root = again.join("zarr.json");
+    let mut begun: Value = serde_json::from_slice(&std::fs::read(&root).unwrap()).unwrap();
+    begun.as_object_mut().unwrap().remove("consolidated_metadata");
+    let ours = &mut begun["attributes"]["btfkit"];
+    ours["stages"] = serde_json::json!({});
+    ours["seal"] = btfkit::zarr::metadata::seal(ours.as_object().unwrap()).into();
+    std::fs::write(&root, begun.to_string()).unwrap();
+    let said = fail(btf().arg("verify").arg(&again), 66);
+    assert!(said.contains("not whole") && !said.contains("damaged"), "{said}");
+    succeed(btf().arg("unpack").args([&at("m.btfc"), &again]));
+    assert!(tree(&again) == whole);
+}

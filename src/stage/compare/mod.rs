@@ -127,7 +127,44 @@ struct Sums {
     colours: Vec<u64>,
 }
 
+/// What the sums of a view count, under all lights.
+struct Counts {
+    texels: u64,
+    samples: u64,
+    /// Texels whose colours are compared.
+    colours: u64,
+}
+
 impl Sums {
+    /// Checks that sums may be those of a view: a seal says only that nobody changed them by accident.
+    ///
+    /// # Errors
+    /// Counts that are not those of a view, and sums that no view has.
+    fn expect_possible(&self, counts: &Counts) -> Result<()> {
+        let steps = self.colours.iter().try_fold(0u64, |sum, &count| sum.checked_add(count));
+        for (what, found, expected) in [
+            ("views", Some(self.views as u64), 1),
+            ("texels", Some(self.code_count), counts.texels),
+            ("samples", self.sample_count.checked_add(self.left_out), counts.samples),
+            ("colours", Some(self.colour_count), counts.colours),
+            ("colours by steps", steps, counts.colours),
+        ] {
+            if found != Some(expected) {
+                let found = found.map_or("more than can be counted".to_owned(), |found| found.to_string());
+                return Err(Error::input(format!("{what}: got {found}, expected {expected}")));
+            }
+        }
+        if self.codes > 255 * self.code_count || self.colours.len() > COLOUR_STEPS + 1 {
+            return Err(Error::input("got differences of lightness or colour beyond the largest there are"));
+        }
+        let is_sum = |sum: f64| sum.is_finite() && sum >= 0.0;
+        if !is_sum(self.squares) || !is_sum(self.colour) {
+            let found = format!("{} and {}", self.squares, self.colour);
+            return Err(Error::input(format!("got the sums {found}, expected finite ones of at least 0")));
+        }
+        Ok(())
+    }
+
     fn add_colour(&mut self, difference: f64) {
         self.colour += difference;
         self.colour_count += 1;
@@ -331,9 +368,10 @@ pub fn run_shared(subject: &Subject, sharing: &Sharing, context: &Context<'_>) -
     });
     let partial = Partial::at(&sharing.folder, &what)?;
     let comparison = Comparison::open(subject)?;
+    let counts = comparison.counts();
     let kept = || {
         let read = |view| match partial.read::<Sums>(view) {
-            Some(sums) => comparison.expect_possible(&sums).map(|()| Some(sums)).map_err(|error| {
+            Some(sums) => sums.expect_possible(&counts).map(|()| Some(sums)).map_err(|error| {
                 error.context(partial.path(view).display()).hint("delete this file and run its part again")
             }),
             None => Ok(None),
@@ -403,38 +441,15 @@ impl<'a> Comparison<'a> {
         Ok(sums)
     }
 
-    /// Checks that sums may be those of a view: a seal says only that nobody changed them by accident.
-    ///
-    /// # Errors
-    /// Counts that are not those of a view, and sums that no view has.
-    fn expect_possible(&self, sums: &Sums) -> Result<()> {
+    /// What a view's sums must count.
+    fn counts(&self) -> Counts {
         let description = self.measurement.description();
-        let lights = description.lights.len() as u64;
-        let texels = self.offsets.len() as u64;
-        let coloured = self.offsets.len().div_ceil(self.stride) as u64 * lights;
-        let samples = texels * description.texel_samples() as u64;
-        let steps = sums.colours.iter().try_fold(0u64, |sum, &count| sum.checked_add(count));
-        for (what, found, expected) in [
-            ("views", Some(sums.views as u64), 1),
-            ("texels", Some(sums.code_count), texels * lights),
-            ("samples", sums.sample_count.checked_add(sums.left_out), samples),
-            ("colours", Some(sums.colour_count), coloured),
-            ("colours by steps", steps, coloured),
-        ] {
-            if found != Some(expected) {
-                let found = found.map_or("more than can be counted".to_owned(), |found| found.to_string());
-                return Err(Error::input(format!("got {found} {what}, expected {expected}")));
-            }
+        let (lights, texels) = (description.lights.len() as u64, self.offsets.len() as u64);
+        Counts {
+            texels: texels * lights,
+            samples: texels * description.texel_samples() as u64,
+            colours: self.offsets.len().div_ceil(self.stride) as u64 * lights,
         }
-        let is_sum = |sum: f64| sum.is_finite() && sum >= 0.0;
-        if sums.codes > 255 * sums.code_count || sums.colours.len() > COLOUR_STEPS + 1 {
-            return Err(Error::input("got differences of lightness or colour beyond the largest there are"));
-        }
-        if !is_sum(sums.squares) || !is_sum(sums.colour) {
-            let found = format!("{} and {}", sums.squares, sums.colour);
-            return Err(Error::input(format!("got the sums {found}, expected finite ones of at least 0")));
-        }
-        Ok(())
     }
 
     fn of_view(&self, view: usize) -> Result<Sums> {
@@ -487,6 +502,40 @@ impl<'a> Comparison<'a> {
             elevations: elevations.iter().map(|(theta, sums)| sums.errors(Some(*theta))).collect(),
             all: sums.iter().fold(Sums::default(), Sums::add).errors(None),
             colour_texels: self.offsets.len().div_ceil(self.stride),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn sums_that_no_view_has_are_refused() {
+        let counts = Counts { texels: 12, samples: 36, colours: 2 };
+        let mut sums = Sums { views: 1, code_count: 12, sample_count: 30, left_out: 6, ..Sums::default() };
+        sums.add_colour(0.5);
+        sums.add_colour(200.0);
+        sums.expect_possible(&counts).unwrap();
+        type Change = fn(&mut Sums);
+        let changes: [(Change, &str); 10] = [
+            (|sums| sums.views = usize::MAX, "views: got 18446744073709551615, expected 1"),
+            (|sums| sums.views = 0, "views: got 0"),
+            (|sums| sums.code_count = u64::MAX, "texels: got"),
+            (|sums| sums.left_out = u64::MAX, "samples: got more than can be counted"),
+            (|sums| sums.sample_count = 31, "samples: got 37, expected 36"),
+            (|sums| sums.colour_count = 3, "colours: got 3"),
+            (|sums| sums.colours = vec![u64::MAX, 3], "colours by steps: got more than can be counted"),
+            (|sums| sums.codes = 12 * 255 + 1, "beyond the largest"),
+            (|sums| sums.squares = -1.0, "expected finite ones"),
+            (|sums| sums.colour = f64::INFINITY, "expected finite ones"),
+        ];
+        for (change, told) in changes {
+            let mut changed = sums.clone();
+            change(&mut changed);
+            let error = changed.expect_possible(&counts).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
         }
     }
 }

@@ -42,11 +42,7 @@ pub(super) fn surface(options: &Options, room: &mut Room, context: &Context<'_>)
         Shape::Plane => Surface::Plane,
         Shape::Sphere => Surface::Sphere,
         Shape::Cylinder => Surface::Cylinder,
-        Shape::Interior => {
-            let mesh = context.compute(interior::mesh)?.with_texture_in_lengths();
-            room.take("the interior", mesh.bytes())?;
-            Surface::Mesh(mesh)
-        }
+        Shape::Interior => Surface::Mesh(context.compute(|| interior::mesh(room))?.with_texture_in_lengths()),
         Shape::Mesh(path) => {
             let file = bytes_of(path)?;
             let bytes = file.as_ref();

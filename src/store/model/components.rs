@@ -12,6 +12,7 @@
 
 use std::collections::BTreeMap;
 
+use btfkit_packed::{LARGEST, LARGEST_OF_BASIS};
 use serde::{Deserialize, Serialize};
 
 use super::{Model, Stage};
@@ -234,18 +235,22 @@ impl Model {
     /// The components.
     ///
     /// # Errors
-    /// Where they have not been found, or hold what is no number.
+    /// Where they have not been found, or hold what is no number, or one of no use.
     pub fn components(&self) -> Result<Components> {
         let shape = self.shape_of_components()?;
-        let numbers = |name: &str, layout: &Layout<'_>| -> Result<Vec<f32>> {
+        // Those of packed models: sums of products have to stay finite.
+        let numbers = |name: &str, layout: &Layout<'_>, most: f64| -> Result<Vec<f32>> {
             let list = self.read::<f32>(Stage::Components, name, layout)?;
-            match list.iter().find(|value| !value.is_finite()) {
+            match list.iter().find(|value| !(f64::from(value.abs()) <= most)) {
                 None => Ok(list),
-                Some(value) => Err(self.damaged(name, &format!("got {value}, expected finite numbers"))),
+                Some(value) => {
+                    let what = format!("got {value:e}, expected finite numbers of at most {most:e}");
+                    Err(self.damaged(name, &what))
+                }
             }
         };
-        let scaled = |name: &str, layout: &Layout<'_>, scale: &str| -> Result<Vec<f32>> {
-            let scales = numbers(scale, &shape.scale())?;
+        let scaled = |name: &str, layout: &Layout<'_>, scale: &str, most: f64| -> Result<Vec<f32>> {
+            let scales = numbers(scale, &shape.scale(), most / -f64::from(i16::MIN))?;
             let steps = self.read::<i16>(Stage::Components, name, layout)?;
             Ok(steps
                 .iter()
@@ -257,9 +262,9 @@ impl Model {
             size: shape.size,
             brdf: [shape.brdf[0], shape.brdf[1]],
             channels: self.values()?.0,
-            mean: numbers("mean", &shape.mean())?,
-            basis: scaled("basis", &shape.basis(), "basis_scale")?,
-            coefficients: scaled("coefficients", &shape.coefficients(), "coefficient_scale")?,
+            mean: numbers("mean", &shape.mean(), LARGEST)?,
+            basis: scaled("basis", &shape.basis(), "basis_scale", LARGEST_OF_BASIS)?,
+            coefficients: scaled("coefficients", &shape.coefficients(), "coefficient_scale", LARGEST)?,
         })
     }
 }

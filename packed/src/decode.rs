@@ -44,10 +44,6 @@ pub struct Unpacked {
     pub planes: Vec<SectionEnd>,
     /// Sections that the file was written with.
     pub sections: usize,
-    /// Bytes before the first of them: the header, and the palette.
-    pub header_bytes: usize,
-    /// Centres of the palette, where images are by one.
-    pub centres: Option<usize>,
     /// How it ends.
     pub ending: Ending,
 }
@@ -73,12 +69,12 @@ pub struct Outline {
     pub sections: usize,
     /// How it ends.
     pub ending: Ending,
-    /// Bytes before the first section: the header, and the palette.
+    /// Bytes of the file.
+    pub bytes: usize,
+    /// Of these, bytes before the first section: the header, and the palette.
     pub header_bytes: usize,
     /// Centres of the palette, where images are by one.
     pub centres: Option<usize>,
-    /// Bytes of the file.
-    pub bytes: usize,
 }
 
 impl Outline {
@@ -105,8 +101,7 @@ impl Outline {
         let transforms = 8 * (2 * (views * views + lights * lights) + 4 * (height + width));
         // An image is turned, and a BRDF, beside what they are turned from.
         let turned = 4 * 8 * brdf.max(image);
-        let index = if self.centres.is_some() { 2 * image } else { 0 };
-        index + self.bytes as u64 + NUMBER * (components + 1) * (brdf + image) + transforms + turned
+        self.bytes as u64 + NUMBER * (components + 1) * (brdf + image) + transforms + turned
     }
 }
 
@@ -188,9 +183,9 @@ pub fn outline(file: &[u8]) -> Result<Outline> {
         planes,
         sections,
         ending,
+        bytes,
         header_bytes,
         centres,
-        bytes,
     })
 }
 
@@ -204,9 +199,8 @@ pub fn outline(file: &[u8]) -> Result<Outline> {
 /// Where not even the first section is whole; sizes that such a file cannot mean; bytes behind the last section; numbers
 /// so large that no values can be made of them.
 pub fn unpack(file: &[u8]) -> Result<Unpacked> {
-    let Parts { header, palette, sections, planes, ending, header_bytes } = Parts::of(file)?;
-    let palette = palette.map(|palette| palette.decoded(header.size)).transpose()?;
-    let centres = palette.as_ref().map(Palette::centres);
+    let Parts { header, palette, sections, planes, ending, .. } = Parts::of(file)?;
+    let palette = palette.map(|coded| Palette::decode(&coded, header.size)).transpose()?;
     let channels = header.channels.len();
     let transforms = Transforms::new(header.size, &header.views, &header.lights, channels, palette);
     let mut stream = Stream::new(&transforms, channels, header.planes);
@@ -236,5 +230,5 @@ pub fn unpack(file: &[u8]) -> Result<Unpacked> {
         texts: header.texts,
     };
     model.check()?;
-    Ok(Unpacked { model, planes, sections: header.sections as usize, header_bytes, centres, ending })
+    Ok(Unpacked { model, planes, sections: header.sections as usize, ending })
 }

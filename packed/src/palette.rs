@@ -75,23 +75,40 @@ impl Palette {
         bytes.extend(payload);
         bytes.extend(crc32fast::hash(&bytes[start..]).to_le_bytes());
     }
+
+    /// Decodes one of a tile of this size.
+    ///
+    /// # Errors
+    /// Where it has centres without texels.
+    pub(crate) fn decode(coded: &CodedPalette<'_>, [height, width]: [usize; 2]) -> Result<Self> {
+        let mut index = vec![0; height * width];
+        code(&mut Decoder::new(coded.payload), &mut index, width, coded.centres);
+        let palette = Self::of(index, coded.centres);
+        match palette.roots.iter().position(|&root| root == 0.0) {
+            None => Ok(palette),
+            Some(centre) => {
+                let found = format!("a palette whose centre {centre} has no texels");
+                Err(Error::new(found, "texels of every centre").at(coded.start))
+            }
+        }
+    }
 }
 
-/// A palette whose index is not decoded yet.
+/// A palette as it lies in a file.
+#[derive(Clone, Copy)]
 pub(crate) struct CodedPalette<'a> {
-    /// How many centres it has.
     pub(crate) centres: usize,
+    payload: &'a [u8],
     /// Byte where it begins.
     start: usize,
-    payload: &'a [u8],
 }
 
 impl<'a> CodedPalette<'a> {
     /// Reads one of a tile of this size.
     ///
     /// # Errors
-    /// Where it is cut or damaged, or has more centres than there are texels.
-    pub(crate) fn read(reader: &mut Reader<'a>, file: &[u8], [height, width]: [usize; 2]) -> Result<Self> {
+    /// Where it is cut or damaged, or has more centres than there may be.
+    pub(crate) fn read(reader: &mut Reader<'a>, file: &'a [u8], [height, width]: [usize; 2]) -> Result<Self> {
         let start = reader.at();
         let centres = usize::from(reader.u16()?);
         let length = reader.u32()? as usize;
@@ -101,29 +118,12 @@ impl<'a> CodedPalette<'a> {
             let found = "a damaged palette: its checksum differs";
             return Err(Error::new(found, "the file as it was written").at(start));
         }
-        let most = MOST_CENTRES.min(height * width);
-        if !(1..=most).contains(&centres) {
-            let found = format!("a palette of {centres} centres for {} texels", height * width);
-            return Err(Error::new(found, format!("1 to {most}")).at(start));
+        let texels = height * width;
+        if !(1..=MOST_CENTRES.min(texels)).contains(&centres) {
+            let found = format!("a palette of {centres} centres for {texels} texels");
+            return Err(Error::new(found, format!("1 to {}", MOST_CENTRES.min(texels))).at(start));
         }
-        Ok(Self { centres, start, payload })
-    }
-
-    /// With its index.
-    ///
-    /// # Errors
-    /// Where it has centres without texels.
-    pub(crate) fn decoded(&self, [height, width]: [usize; 2]) -> Result<Palette> {
-        let mut index = vec![0; height * width];
-        code(&mut Decoder::new(self.payload), &mut index, width, self.centres);
-        let palette = Palette::of(index, self.centres);
-        match palette.roots.iter().position(|&root| root == 0.0) {
-            None => Ok(palette),
-            Some(centre) => {
-                let found = format!("a palette whose centre {centre} has no texels");
-                Err(Error::new(found, "texels of every centre").at(self.start))
-            }
-        }
+        Ok(Self { centres, payload, start })
     }
 }
 
@@ -178,8 +178,8 @@ mod tests {
             palette.write(&mut bytes, size[1]);
             let mut reader = Reader::new(&bytes);
             reader.take(1).unwrap();
-            let read = CodedPalette::read(&mut reader, &bytes, size).unwrap();
-            assert_eq!(read.decoded(size).unwrap(), palette);
+            let coded = CodedPalette::read(&mut reader, &bytes, size).unwrap();
+            assert_eq!(Palette::decode(&coded, size).unwrap(), palette);
             assert_eq!(reader.left(), 0);
             let numbers: Vec<f64> = (0..palette.centres()).map(|k| k as f64 - 1.5).collect();
             let image = palette.to_image(&numbers);

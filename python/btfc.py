@@ -32,6 +32,7 @@ class Model:
     basis: np.ndarray  # [component, view, light, channel]
     coefficients: np.ndarray  # [component, y, x]
     planes: list = field(default_factory=list)  # (end, components, dB) of each section
+    index: np.ndarray = None  # [y, x] centre of each texel, where the file has a palette
     complete: bool = True
 
 
@@ -188,6 +189,34 @@ def code_plane(decoder, contexts, kind, frequencies, grid, before, shift):
                     m[at] = 1
 
 
+def palette(data, content, height, width):
+    """The index [y, x] of a file of version 2."""
+    start = data.at
+    centres, size = data.get("HI")
+    payload = data.take(size)
+    if zlib.crc32(content[start : data.at]) != data.get("I"):
+        raise ValueError("a damaged palette")
+    decoder, equal, tree = Decoder(payload), Contexts(), Contexts()
+    bits = (centres - 1).bit_length()
+    index = np.zeros((height, width), int)
+    for y in range(height):
+        for x in range(width):
+            near = []
+            for v, u in ((y, x - 1), (y - 1, x), (y - 1, x + 1), (y - 1, x - 1)):
+                if v >= 0 and 0 <= u < width and index[v, u] not in near:
+                    near.append(index[v, u])
+            for n, centre in enumerate(near):
+                if decoder.bit(equal[n, len(near)]):
+                    index[y, x] = centre
+                    break
+            else:
+                node = 1
+                for _ in range(bits):
+                    node = 2 * node + decoder.bit(tree[node])
+                index[y, x] = min(node - (1 << bits), centres - 1)
+    return index
+
+
 def polynomials(directions):
     """Orthonormal rows [polynomial, direction], and their degrees."""
     theta, phi = np.radians(directions).T
@@ -265,8 +294,11 @@ def directions(data, before):
 def unpack(content):
     """The model of a file's bytes."""
     data = Bytes(content)
-    if data.take(4) != b"BTFC" or data.get("B") != 1:
-        raise ValueError("no packed model of version 1")
+    if data.take(4) != b"BTFC":
+        raise ValueError("no packed model")
+    version = data.get("B")
+    if version not in (1, 2):
+        raise ValueError(f"version {version}, expected 1 or 2")
     wraps, planes, sections, height, width, n_channels = data.get("BBBHHH")
     step, length = data.get("fI")
     end = data.at + length
@@ -281,10 +313,18 @@ def unpack(content):
         texts[name] = data.text("H")
     data.at = end + 4
 
+    index = palette(data, content, height, width) if version == 2 else None
+
     (of_views, view_degrees), (of_lights, light_degrees) = polynomials(views), polynomials(lights)
     brdf = n_channels, len(views), len(lights)
     by_degree = [[min(d // 2, SIDE - 1) for d in list_] for list_ in (view_degrees, light_degrees)]
-    by_octave = [[min((k + 1).bit_length() - 1, SIDE - 1) for k in range(n)] for n in (height, width)]
+    if index is None:
+        image = 1, height, width
+        of_image = [[min((k + 1).bit_length() - 1, SIDE - 1) for k in range(n)] for n in (height, width)]
+    else:
+        roots = np.sqrt(np.bincount(index.ravel()))
+        image = 1, 1, len(roots)
+        of_image = [[0], [0] * len(roots)]
     mean, bases, images, strengths, reached = Grid(*brdf), [], [], [], []
     brdf_contexts, image_contexts = Contexts(), Contexts()
     mean_reached, found = planes, []
@@ -305,11 +345,11 @@ def unpack(content):
         for number in range(components):
             if number == len(bases):
                 bases.append(Grid(*brdf))
-                images.append(Grid(1, height, width))
+                images.append(Grid(*image))
                 reached.append(planes)
             for contexts, frequencies, grids in (
                 (brdf_contexts, by_degree, bases),
-                (image_contexts, by_octave, images),
+                (image_contexts, of_image, images),
             ):
                 before = [grids[number - back] if number >= back else None for back in (1, 2, 3)]
                 for plane in reversed(range(low, reached[number])):
@@ -326,6 +366,11 @@ def unpack(content):
     def to_brdf(spectrum):
         return np.einsum("kab,av,bl,kc->vlc", spectrum, of_views, of_lights, rotation, optimize=True)
 
+    def to_image(spectrum):
+        if index is None:
+            return rows.T @ spectrum @ columns
+        return (spectrum[0] / roots)[index]
+
     def strength(code):
         return 2.0 ** (code / 256 - 64)
 
@@ -340,9 +385,10 @@ def unpack(content):
         basis=np.array([to_brdf(g.values(finest)) / strength(c) for g, c in zip(bases, strengths)]).reshape(
             -1, len(views), len(lights), n_channels
         ),
-        coefficients=np.array([rows.T @ g.values(finest)[0] @ columns for g in images]).reshape(-1, height, width),
+        coefficients=np.array([to_image(g.values(finest)[0]) for g in images]).reshape(-1, height, width),
         planes=found,
         complete=len(found) == sections,
+        index=index,
     )
 
 

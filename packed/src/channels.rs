@@ -1,7 +1,8 @@
 //! The rotation of the channels: brightness apart from colour.
 
-/// An orthonormal matrix [new channel][channel]. Three channels take the fixed rotation (1, 1, 1) / sqrt 3,
-/// (1, 0, -1) / sqrt 2, (1, -2, 1) / sqrt 6, which is the DCT of length 3 up to signs; any other number takes its DCT.
+/// The orthonormal DCT-II matrix of so many channels, [rotated channel][channel]. Of three channels its rows are
+/// brightness, (1, 1, 1) / sqrt 3, and two differences of colours, (1, 0, -1) / sqrt 2 and (1, -2, 1) / sqrt 6; of
+/// wavelengths they are brightness, slope, curvature and so on of the spectrum.
 pub(crate) fn rotation(count: usize) -> Vec<Vec<f64>> {
     let row = |frequency: usize| -> Vec<f64> {
         let scale = ((if frequency == 0 { 1.0 } else { 2.0 }) / count as f64).sqrt();

@@ -4,6 +4,7 @@ use crate::bytes::Reader;
 use crate::error::{Error, Result};
 use crate::header::{Header, expect_numbers};
 use crate::model::{Component, Direction, Model};
+use crate::palette::{CodedPalette, Palette};
 use crate::quantise::strength;
 use crate::range_coder::Decoder;
 use crate::section::{Found, Section};
@@ -70,8 +71,10 @@ pub struct Outline {
     pub ending: Ending,
     /// Bytes of the file.
     pub bytes: usize,
-    /// Of these, bytes of the header, before the first section.
+    /// Of these, bytes before the first section: the header, and the palette.
     pub header_bytes: usize,
+    /// Centres of the palette, where images are by one.
+    pub centres: Option<usize>,
 }
 
 impl Outline {
@@ -105,6 +108,7 @@ impl Outline {
 /// A file in its parts, none of which is decoded.
 struct Parts<'a> {
     header: Header,
+    palette: Option<CodedPalette<'a>>,
     header_bytes: usize,
     sections: Vec<Section<'a>>,
     planes: Vec<SectionEnd>,
@@ -115,6 +119,10 @@ impl<'a> Parts<'a> {
     fn of(file: &'a [u8]) -> Result<Self> {
         let mut reader = Reader::new(file);
         let header = Header::read(&mut reader, file)?;
+        let palette = match header.has_palette {
+            true => Some(CodedPalette::read(&mut reader, file, header.size)?),
+            false => None,
+        };
         let header_bytes = reader.at();
         let brdf = header.views.len() * header.lights.len() * header.channels.len();
         let texels = header.size[0] * header.size[1];
@@ -151,7 +159,7 @@ impl<'a> Parts<'a> {
             let found = format!("{} bytes behind the last section", reader.left());
             return Err(Error::new(found, "the end of the file").at(reader.at()));
         }
-        Ok(Self { header, header_bytes, sections, planes, ending })
+        Ok(Self { header, palette, header_bytes, sections, planes, ending })
     }
 }
 
@@ -160,11 +168,25 @@ impl<'a> Parts<'a> {
 /// # Errors
 /// As [`unpack`], but for what only the numbers tell.
 pub fn outline(file: &[u8]) -> Result<Outline> {
-    let Parts { header, header_bytes, planes, ending, .. } = Parts::of(file)?;
+    let Parts { header, palette, header_bytes, planes, ending, .. } = Parts::of(file)?;
+    let centres = palette.map(|palette| palette.centres);
     let sections = header.sections as usize;
     let Header { size, wraps, views, lights, channels, texts, .. } = header;
     let bytes = file.len();
-    Ok(Outline { size, wraps, views, lights, channels, texts, planes, sections, ending, bytes, header_bytes })
+    Ok(Outline {
+        size,
+        wraps,
+        views,
+        lights,
+        channels,
+        texts,
+        planes,
+        sections,
+        ending,
+        bytes,
+        header_bytes,
+        centres,
+    })
 }
 
 /// Reads a packed model, as fine as its bytes allow.
@@ -177,10 +199,12 @@ pub fn outline(file: &[u8]) -> Result<Outline> {
 /// Where not even the first section is whole; sizes that such a file cannot mean; bytes behind the last section; numbers
 /// so large that no values can be made of them.
 pub fn unpack(file: &[u8]) -> Result<Unpacked> {
-    let Parts { header, sections, planes, ending, .. } = Parts::of(file)?;
-    let transforms = Transforms::new(header.size, &header.views, &header.lights, header.channels.len());
-    let mut stream = Stream::new(header.size, transforms.degrees(), header.channels.len(), header.planes);
-    let texels = stream.image.values();
+    let Parts { header, palette, sections, planes, ending, .. } = Parts::of(file)?;
+    let palette = palette.map(|coded| Palette::decode(&coded, header.size)).transpose()?;
+    let channels = header.channels.len();
+    let transforms = Transforms::new(header.size, &header.views, &header.lights, channels, palette);
+    let mut stream = Stream::new(&transforms, channels, header.planes);
+    let texels = header.size[0] * header.size[1];
     let mut strengths: Vec<u16> = vec![];
     for (low, section) in (0..header.sections).rev().zip(sections) {
         let mut decoder = Decoder::new(section.payload);

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::header::{Header, expect_numbers};
 use crate::model::Model;
+use crate::palette::Palette;
 use crate::quantise::{MOST_PLANES, quantised, strength, strength_code, value};
 use crate::range_coder::Encoder;
 use crate::section::Section;
@@ -53,16 +54,18 @@ pub(crate) struct Prepared<'a> {
 }
 
 impl<'a> Prepared<'a> {
-    /// Transforms a model, whose squared error over all texels and directions is `residual`, if it is known.
+    /// Transforms a model, whose squared error over all texels and directions is `residual`, if it is known; by a palette
+    /// or by cosines.
     ///
     /// # Errors
     /// A model whose parts do not fit together.
-    pub(crate) fn new(model: &'a Model, residual: Option<f64>) -> Result<Self> {
+    pub(crate) fn new(model: &'a Model, residual: Option<f64>, palette: Option<Palette>) -> Result<Self> {
         model.check()?;
         // What a file says of sizes and directions.
         let header = Header::of(model, 1.0, 1, 1)?.to_bytes()?;
         let header = Header::read(&mut crate::bytes::Reader::new(&header), &header)?;
-        let transforms = Transforms::new(model.size, &header.views, &header.lights, model.channels.len());
+        let transforms =
+            Transforms::new(model.size, &header.views, &header.lights, model.channels.len(), palette);
         let scaled = |list: &[f64], scale: f64| list.iter().map(|value| value * scale).collect::<Vec<f64>>();
         let mean = scaled(&transforms.of_brdf(&model.mean), (model.texels() as f64).sqrt());
         let parts = model.components.iter().map(|component| {
@@ -86,6 +89,15 @@ impl<'a> Prepared<'a> {
         packed.components == self.parts.len()
     }
 
+    /// Peak signal-to-noise ratio that no step goes beyond: a palette leaves out what centres do not say.
+    pub(crate) fn most_decibels(&self) -> f64 {
+        let left = self.parts.iter().map(|part| {
+            let strength = strength(part.strength);
+            (part.energy - energy(&part.image) * energy(&part.basis) / (strength * strength)).max(0.0)
+        });
+        self.decibels(self.residual.unwrap_or(0.0) + left.sum::<f64>())
+    }
+
     /// Peak signal-to-noise ratio of a squared error.
     fn decibels(&self, error: f64) -> f64 {
         let count = (self.model.texels() * self.model.brdf()) as f64;
@@ -107,10 +119,13 @@ impl<'a> Prepared<'a> {
         let most = parts.iter().flatten().chain([&mean]).flatten().map(|number| number.unsigned_abs()).max();
         let planes = (u32::BITS - most.unwrap_or(0).leading_zeros()).clamp(1, MOST_PLANES);
         let sections = sections.min(planes);
-        let header = Header::of(self.model, step, planes, sections)?;
+        let mut header = Header::of(self.model, step, planes, sections)?;
+        header.has_palette = self.transforms.palette().is_some();
         let mut bytes = header.to_bytes()?;
-        let mut stream =
-            Stream::new(self.model.size, self.transforms.degrees(), self.model.channels.len(), planes);
+        if let Some(palette) = self.transforms.palette() {
+            palette.write(&mut bytes, self.model.size[1]);
+        }
+        let mut stream = Stream::new(&self.transforms, self.model.channels.len(), planes);
         let (mut components, mut decibels) = (0, 0.0);
         for low in (0..sections).rev() {
             let coarse = finest * f64::from(1u32 << low);

@@ -9,8 +9,8 @@ use crate::quantise::MOST_PLANES;
 /// The first bytes of a packed model.
 pub const MAGIC: [u8; 4] = *b"BTFC";
 
-/// Version of the format.
-const VERSION: u8 = 1;
+/// Versions of the format: images by cosines, and images by a palette.
+const VERSIONS: [u8; 2] = [1, 2];
 
 /// Longest side of a tile in texels.
 pub const MOST_SIDE: usize = 4096;
@@ -32,6 +32,8 @@ const NUMBERS: [usize; 2] = [1 << 22, 1 << 12];
 pub(crate) struct Header {
     pub(crate) size: [usize; 2],
     pub(crate) wraps: bool,
+    /// Whether a palette follows the header.
+    pub(crate) has_palette: bool,
     pub(crate) views: Vec<Direction>,
     pub(crate) lights: Vec<Direction>,
     pub(crate) channels: Vec<String>,
@@ -83,6 +85,7 @@ impl Header {
         Ok(Self {
             size: model.size,
             wraps: model.wraps,
+            has_palette: false,
             views: model.views.clone(),
             lights: model.lights.clone(),
             channels: model.channels.clone(),
@@ -111,7 +114,8 @@ impl Header {
             push_long(&mut rest, text)?;
         }
         let mut bytes = MAGIC.to_vec();
-        bytes.extend([VERSION, u8::from(self.wraps), self.planes as u8, self.sections as u8]);
+        let version = VERSIONS[usize::from(self.has_palette)];
+        bytes.extend([version, u8::from(self.wraps), self.planes as u8, self.sections as u8]);
         for side in self.size {
             bytes.extend((side as u16).to_le_bytes());
         }
@@ -137,10 +141,11 @@ impl Header {
             .at(0));
         }
         let version = reader.u8()?;
-        if version != VERSION {
+        if !VERSIONS.contains(&version) {
             let found = format!("version {version} of packed models");
-            return Err(Error::new(found, format!("version {VERSION}; a newer btfkit may read it")).at(4));
+            return Err(Error::new(found, "version 1 or 2; a newer btfkit may read it").at(4));
         }
+        let has_palette = version == VERSIONS[1];
         let flags = reader.u8()?;
         let [planes, sections] = [reader.u8()?, reader.u8()?].map(u32::from);
         let size = [reader.u16()?, reader.u16()?].map(usize::from);
@@ -183,7 +188,9 @@ impl Header {
             return Err(Error::new(format!("a step of {step:e}"), expected).at(14));
         }
         let brdf = views.len() * lights.len() * channels;
-        expect_numbers(brdf, size[0] * size[1], 0, file.len())?;
+        // A palette has a number for each texel even without components.
+        let least = if has_palette { brdf + size[0] * size[1] } else { brdf };
+        expect_numbers(least, size[0] * size[1], 0, file.len())?;
         let names = (0..channels).map(|_| {
             let length = reader.u8()?;
             reader.text(usize::from(length))
@@ -201,6 +208,17 @@ impl Header {
             return Err(Error::new(found, format!("byte {end}, as it says")).at(reader.at()));
         }
         reader.u32()?;
-        Ok(Self { size, wraps: flags == 1, views, lights, channels, texts, step, planes, sections })
+        Ok(Self {
+            size,
+            wraps: flags == 1,
+            has_palette,
+            views,
+            lights,
+            channels,
+            texts,
+            step,
+            planes,
+            sections,
+        })
     }
 }

@@ -15,6 +15,7 @@
 //! | polynomials of the directions, a cosine transform of the texels, a rotation of the colours | [`polynomials`], [`dct`], [`channels`], [`spectrum`] |
 //! | whole numbers, bit plane by bit plane | [`quantise`], [`grid`], [`stream`] |
 //! | bits to bytes | [`range_coder`] |
+//! | or, instead of the cosine transform, an index into few centres | [`palette`], [`centres`] |
 //! | header, sections, checksums | [`header`], [`section`] |
 //! | the two ways | [`encode`], [`decode`] |
 //!
@@ -23,6 +24,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod bytes;
+mod centres;
 mod channels;
 mod dct;
 mod decode;
@@ -32,6 +34,7 @@ mod error;
 mod grid;
 mod header;
 mod model;
+mod palette;
 mod polynomials;
 mod quantise;
 mod range_coder;

@@ -1,4 +1,5 @@
-//! An adaptive binary range coder of 32 bits, after that of LZMA, and its probabilities.
+//! An adaptive binary range coder of 32 bits, after that of LZMA, and its probabilities: each bit narrows a range of
+//! numbers by how likely it is, and the bytes are a number in the range that is left.
 
 /// Bits of a probability in the coder.
 const BITS: u32 = 15;

@@ -1,8 +1,10 @@
 //! The step for a wanted size or quality.
 
+use crate::centres::nearest_of;
 use crate::encode::{Packed, Prepared};
 use crate::error::{Error, Result};
 use crate::model::Model;
+use crate::palette::Palette;
 use crate::quantise::MOST_PLANES;
 
 /// What a packed model is to be.
@@ -30,13 +32,48 @@ const NEAR: f64 = 0.004;
 /// Bytes below which a file has few sections: each costs a dozen.
 const SMALL: usize = 1 << 14;
 
-/// Packs a model. `residual` is the squared error of the model itself, over all texels and directions, if it is known;
+/// Numbers of centres of the palettes that are tried.
+const CENTRES: [usize; 3] = [64, 256, 1024];
+
+/// Texels that a centre has at least, on average.
+const TEXELS_OF_A_CENTRE: usize = 8;
+
+/// Packs a model, by cosines or by a palette, whichever is better at the target. `residual` is the squared error of the model itself, over all texels and directions, if it is known;
 /// it is only needed to say how good the result is.
 ///
 /// # Errors
 /// A target that cannot be met; a model whose parts do not fit together, or that the format has no room for.
 pub fn pack(model: &Model, residual: Option<f64>, target: Target) -> Result<Packed> {
-    let prepared = Prepared::new(model, residual)?;
+    let mut best = search(&Prepared::new(model, residual, None)?, target);
+    for count in CENTRES {
+        if model.texels() < TEXELS_OF_A_CENTRE * count {
+            break;
+        }
+        let palette = Palette::new(&nearest_of(model, count));
+        let prepared = Prepared::new(model, residual, Some(palette))?;
+        let wanted = match (target, &best) {
+            (Target::Decibels(decibels), _) => decibels,
+            (Target::Bytes(_), Ok(best)) => best.decibels,
+            (Target::Bytes(_), Err(_)) => break,
+        };
+        if prepared.most_decibels() <= wanted {
+            continue;
+        }
+        if let (Ok(found), Ok(before)) = (search(&prepared, target), &best) {
+            let is_better = match target {
+                Target::Bytes(_) => found.decibels > before.decibels,
+                Target::Decibels(_) => found.bytes.len() < before.bytes.len(),
+            };
+            if is_better {
+                best = Ok(found);
+            }
+        }
+    }
+    best
+}
+
+/// The step of one way.
+fn search(prepared: &Prepared<'_>, target: Target) -> Result<Packed> {
     let largest = libm::log2(prepared.largest());
     if !largest.is_finite() {
         return Err(Error::new("a model of nothing but zeros", "a measurement"));

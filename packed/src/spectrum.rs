@@ -3,6 +3,7 @@
 use crate::channels::rotation;
 use crate::dct::Dct;
 use crate::model::Direction;
+use crate::palette::Palette;
 use crate::polynomials::Polynomials;
 use crate::turn::transposed;
 
@@ -11,22 +12,53 @@ pub(crate) struct Transforms {
     views: Polynomials,
     lights: Polynomials,
     rotation: Vec<Vec<f64>>,
-    dct: Dct,
+    images: Images,
+}
+
+/// How images become few numbers.
+enum Images {
+    Cosines(Dct, [usize; 2]),
+    Palette(Palette),
 }
 
 impl Transforms {
-    pub(crate) fn new(size: [usize; 2], views: &[Direction], lights: &[Direction], channels: usize) -> Self {
+    pub(crate) fn new(
+        size: [usize; 2],
+        views: &[Direction],
+        lights: &[Direction],
+        channels: usize,
+        palette: Option<Palette>,
+    ) -> Self {
         Self {
             views: Polynomials::new(views),
             lights: Polynomials::new(lights),
             rotation: rotation(channels),
-            dct: Dct::new(size),
+            images: match palette {
+                Some(palette) => Images::Palette(palette),
+                None => Images::Cosines(Dct::new(size), size),
+            },
         }
     }
 
     /// Degrees of the polynomials of views and lights.
     pub(crate) fn degrees(&self) -> [&[usize]; 2] {
         [self.views.degrees(), self.lights.degrees()]
+    }
+
+    /// Frequencies of the rows and columns of an image's spectrum; centres of a palette have none.
+    pub(crate) fn frequencies(&self) -> [Vec<usize>; 2] {
+        match &self.images {
+            Images::Cosines(_, size) => size.map(|side| (0..side).collect()),
+            Images::Palette(palette) => [vec![0], vec![0; palette.centres()]],
+        }
+    }
+
+    /// The palette, where images are by one.
+    pub(crate) fn palette(&self) -> Option<&Palette> {
+        match &self.images {
+            Images::Cosines(..) => None,
+            Images::Palette(palette) => Some(palette),
+        }
     }
 
     /// A BRDF [view, light, channel] as [channel, polynomial of views, polynomial of lights].
@@ -63,17 +95,27 @@ impl Transforms {
         brdf
     }
 
-    /// An image [y, x] as its cosine spectrum.
+    /// An image [y, x] as its cosine spectrum, or as numbers of the centres of a palette.
     pub(crate) fn of_image(&self, image: &[f64]) -> Vec<f64> {
-        let mut spectrum = image.to_vec();
-        self.dct.forward(&mut spectrum);
-        spectrum
+        match &self.images {
+            Images::Cosines(dct, _) => {
+                let mut spectrum = image.to_vec();
+                dct.forward(&mut spectrum);
+                spectrum
+            }
+            Images::Palette(palette) => palette.of_image(image),
+        }
     }
 
-    /// Back from a cosine spectrum to an image.
+    /// Back to an image.
     pub(crate) fn to_image(&self, mut spectrum: Vec<f64>) -> Vec<f64> {
-        self.dct.inverse(&mut spectrum);
-        spectrum
+        match &self.images {
+            Images::Cosines(dct, _) => {
+                dct.inverse(&mut spectrum);
+                spectrum
+            }
+            Images::Palette(palette) => palette.to_image(&spectrum),
+        }
     }
 
     fn shape(&self) -> [usize; 3] {
@@ -119,7 +161,7 @@ mod tests {
         let views: Vec<Direction> = (0..5).map(direction).collect();
         let lights: Vec<Direction> = (0..8).map(direction).collect();
         for channels in [1, 3, 4] {
-            let transforms = Transforms::new([3, 4], &views, &lights, channels);
+            let transforms = Transforms::new([3, 4], &views, &lights, channels, None);
             let brdf: Vec<f64> = (0..5 * 8 * channels).map(|n| (n * 37 % 23) as f64).collect();
             let spectrum = transforms.of_brdf(&brdf);
             let energy = |list: &[f64]| list.iter().map(|v| v * v).sum::<f64>();

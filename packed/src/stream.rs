@@ -5,6 +5,7 @@
 
 use crate::grid::{Before, Contexts, Grid, Kind, Shape, Wanted, code_plane};
 use crate::range_coder::Coder;
+use crate::spectrum::Transforms;
 
 /// The numbers of a component in units of the finest step; empty in a decoder.
 #[derive(Clone, Copy, Default)]
@@ -34,10 +35,10 @@ pub(crate) struct Mark {
 }
 
 impl Stream {
-    /// Before the first section: `degrees` are those of the polynomials of views and lights.
-    pub(crate) fn new(size: [usize; 2], degrees: [&[usize]; 2], channels: usize, planes: u32) -> Self {
+    /// Before the first section.
+    pub(crate) fn new(transforms: &Transforms, channels: usize, planes: u32) -> Self {
+        let (degrees, [rows, columns]) = (transforms.degrees(), transforms.frequencies());
         let brdf = Shape::new(Kind::Brdf, channels, degrees[0], degrees[1], planes);
-        let [rows, columns] = size.map(|side| (0..side).collect::<Vec<usize>>());
         let image = Shape::new(Kind::Image, 1, &rows, &columns, planes);
         Self {
             mean: Grid::new(&brdf),

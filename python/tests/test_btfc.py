@@ -22,6 +22,14 @@ def test_the_fixture_is_decoded_to_the_same_numbers():
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
 
 
+def test_a_file_with_a_palette_is_decoded_to_the_same_numbers():
+    model = btfc.read(FIXTURES / "palette.btfc")
+    assert model.complete and model.size == (26, 22) and model.index.max() == 22
+    parts = [part for k in range(len(model.basis)) for part in (model.basis[k], model.coefficients[k])]
+    found = np.concatenate([model.mean.ravel()] + [part.ravel() for part in parts])
+    np.testing.assert_allclose(found, np.fromfile(FIXTURES / "palette.f64", "<f8"), rtol=0, atol=1e-9)
+
+
 def test_a_part_of_the_file_is_a_coarser_model():
     content = (FIXTURES / "small.btfc").read_bytes()
     whole = btfc.unpack(content)

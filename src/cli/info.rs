@@ -258,7 +258,18 @@ fn of_packed(about: &pack::About) -> Rows {
         row!["views", views],
         row!["lights", lights],
         row!["borders join", yes(about.wraps)],
-        row!["bytes", format!("{}, of these {} of the header", about.bytes, about.header_bytes)],
+        row![
+            "coefficients",
+            about.centres.map_or("by cosines".to_owned(), |n| format!("by a palette of {n}"))
+        ],
+        row![
+            "bytes",
+            match about.centres {
+                None => format!("{}, of these {} of the header", about.bytes, about.header_bytes),
+                Some(_) =>
+                    format!("{}, of these {} of the header and the palette", about.bytes, about.header_bytes),
+            }
+        ],
         row!["as arrays of a model", format!("{}, {}", bytes_text(about.raw_bytes), ratio(about.raw_bytes))],
     ];
     if let Some(raw) = about.tile_bytes {

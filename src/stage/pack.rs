@@ -203,9 +203,9 @@ fn unpacked_model(model: &Model) -> Result<packed::Model> {
     })
 }
 
-/// A plane of a packed model, for people.
+/// What is known of a section of a packed model: a file that is cut behind it is a model, too.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Plane {
+pub struct Section {
     /// Bytes up to its end: a file that is cut there is a model.
     pub bytes: usize,
     /// Components.
@@ -229,8 +229,10 @@ pub struct About {
     pub channels: Vec<String>,
     /// Bytes of the file.
     pub bytes: usize,
-    /// Of these, bytes of the header: sizes, directions, names and texts.
+    /// Of these, bytes of the header (sizes, directions, names and texts) and of the palette.
     pub header_bytes: usize,
+    /// Centres of the palette, where coefficients are by one.
+    pub centres: Option<usize>,
     /// Bytes of the same components as a model keeps them.
     pub raw_bytes: u64,
     /// Bytes of the tile's samples, where their type is said.
@@ -238,7 +240,7 @@ pub struct About {
     /// Whether the tile is all of the measurement.
     pub whole_measurement: bool,
     /// What it can be cut to.
-    pub planes: Vec<Plane>,
+    pub planes: Vec<Section>,
     /// What else is said.
     pub texts: Vec<(String, String)>,
     /// What is wrong with its end.
@@ -254,11 +256,22 @@ pub fn about(path: &Path) -> Result<About> {
     let (notes, samples) = (file.notes(), file.sample_type());
     let whole_measurement = file.text(MEASUREMENT).is_some();
     let components = file.outline.components();
-    let packed::Outline { size, wraps, views, lights, channels, texts, planes, bytes, header_bytes, .. } =
-        file.outline;
+    let packed::Outline {
+        size,
+        wraps,
+        views,
+        lights,
+        channels,
+        texts,
+        planes,
+        bytes,
+        header_bytes,
+        centres,
+        ..
+    } = file.outline;
     let (brdf, texels) = (views.len() * lights.len() * channels.len(), size[0] * size[1]);
     let values = (texels * brdf) as u64;
-    let plane = |plane: &packed::SectionEnd| Plane {
+    let plane = |plane: &packed::SectionEnd| Section {
         bytes: plane.end,
         components: plane.components,
         psnr_db: plane.decibels,
@@ -270,6 +283,7 @@ pub fn about(path: &Path) -> Result<About> {
         directions: [views.len(), lights.len()],
         bytes,
         header_bytes,
+        centres,
         raw_bytes: raw_bytes(components, brdf, texels),
         whole_measurement,
         tile_bytes: samples.map(|samples| samples.bytes() as u64 * values),

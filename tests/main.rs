@@ -33,6 +33,8 @@ mod crafted_stores;
 mod curve;
 #[path = "behaviour/damaged_stores.rs"]
 mod damaged_stores;
+#[path = "behaviour/dead_ends.rs"]
+mod dead_ends;
 #[path = "behaviour/deepzoom.rs"]
 mod deepzoom;
 #[path = "behaviour/determinism.rs"]

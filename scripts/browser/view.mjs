@@ -297,6 +297,31 @@ async function shots() {
   }
 }
 
+// While the tile stands in for the endless surface, the page says that it computes; title and controls never overlap.
+async function first_moments() {
+  for (const [width, height] of [[700, 450], [1000, 700], [400, 600]]) {
+    const { page, wrong } = await open(`${pathToFileURL(join(work, "view.html")).href}#surface=endless`, {
+      width, height,
+      before: () => {
+        window.told = [];
+        new MutationObserver(() => {
+          const notice = document.getElementById("notice");
+          if (notice && !notice.hidden) window.told.push(`${document.body.classList.contains("bare")} ${notice.textContent}`);
+        }).observe(document, { subtree: true, childList: true, attributes: true });
+      },
+    });
+    await settled(page);
+    assert.ok((await page.evaluate(() => window.told)).some(told => /^true Computing the surface/.test(told)), "nothing was said");
+    assert.ok(await page.evaluate(() => document.getElementById("notice").hidden && !document.body.classList.contains("bare")));
+    const [title, panel] = await page.evaluate(() => ["header", "#panel"].map(name => document.querySelector(name).getBoundingClientRect().toJSON()));
+    const is_seen = await page.evaluate(() => getComputedStyle(document.querySelector("#panel")).visibility === "visible");
+    assert.ok(!is_seen || title.right <= panel.left || title.bottom <= panel.top, `${width}x${height}: the controls overlap the title`);
+    assert.match(await page.textContent("[data-light]"), /theta \d+°, phi \d+°/);
+    assert.deepEqual(wrong, []);
+    await page.close();
+  }
+}
+
 // Without WebGL 2 the page says so.
 async function without_webgl() {
   const { page } = await open(pathToFileURL(join(work, "view.html")).href, {
@@ -351,6 +376,7 @@ try {
   assert.deepEqual(enlarged.wrong, []);
   await enlarged.page.close();
   await shots();
+  await first_moments();
   await without_webgl();
   await served();
 } catch (error) {

@@ -18,6 +18,8 @@ pub(super) struct Found {
     pub(super) catalogue: Catalogue,
     pub(super) format: String,
     pub(super) assumptions: Vec<Assumption>,
+    /// How many of the files are lists that were read: no images, and not ignored.
+    pub(super) lists: usize,
 }
 
 /// What to do where names tell nothing.
@@ -54,7 +56,8 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
         let catalogue = complete(pairs)?;
         let mut assumptions = if table.has_view { Vec::new() } else { vec![frontal()] };
         assumptions.extend(remark.map(Assumption::from));
-        return Ok(Found { catalogue, format: "pictures with a table".to_owned(), assumptions });
+        let lists = files.names().filter(|name| Path::new(name) == path).count();
+        return Ok(Found { catalogue, format: "pictures with a table".to_owned(), assumptions, lists });
     }
     if let Some(text) = &options.pattern {
         let pattern = Pattern::parse(text).map_err(|error| {
@@ -83,6 +86,7 @@ pub(super) fn find(archive: &Path, files: &Files, options: &Options, limits: &Li
             catalogue: complete(pairs)?,
             format: "pictures named as in UBO2003".to_owned(),
             assumptions: turns.into_iter().collect(),
+            lists: 0,
         });
     }
     let pattern = named::recognise(files.names()).map_err(|error| {
@@ -188,7 +192,7 @@ fn by_pattern(
         assumptions.push(frontal());
     }
     assumptions.extend(turns);
-    Ok(Found { catalogue, format: "pictures named by a pattern".to_owned(), assumptions })
+    Ok(Found { catalogue, format: "pictures named by a pattern".to_owned(), assumptions, lists: 0 })
 }
 
 fn of_ubo2003_name(name: &str) -> Option<Pair> {
@@ -232,7 +236,8 @@ fn by_light_lists(
     let Some((_, lights)) = read else { return Err(Error::internal("no light list")) };
     let Lights { pairs, mut assumptions } = lights?;
     assumptions.insert(0, frontal());
-    Ok(Found { catalogue: complete(pairs)?, format: "RTI light list (.lp)".to_owned(), assumptions })
+    let format = "RTI light list (.lp)".to_owned();
+    Ok(Found { catalogue: complete(pairs)?, format, assumptions, lists: lists.len() })
 }
 
 fn read_light_list(files: &Files, list: usize, limits: &Limits) -> Result<Lights> {

@@ -1,4 +1,5 @@
-//! The directions of an archive as they should have been: left out, exchanged, elevations, mirrored, turned.
+//! Corrects the directions of an archive as the options say: leaves some out, exchanges views and lights, reads
+//! elevations, mirrors and turns azimuths.
 
 use std::path::Path;
 
@@ -30,7 +31,10 @@ impl Adaptation {
         let kept = |what: &str, count: usize, dropped: &[usize]| {
             let path = path.display();
             if let Some(&beyond) = dropped.iter().find(|&&number| number >= count) {
-                return Err(Error::usage(format!("{path}: no {what} {beyond} to drop, there are {count}")));
+                return Err(Error::usage(format!(
+                    "{path}: there is no {what} {beyond} to drop: {what}s are numbered 0 to {}",
+                    count.saturating_sub(1)
+                )));
             }
             let kept: Vec<usize> =
                 (0..count).filter(|number| dropped.binary_search(number).is_err()).collect();

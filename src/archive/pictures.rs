@@ -47,7 +47,8 @@ impl Pictures {
     pub(super) fn open(paths: &[PathBuf], options: &Options, limits: Limits) -> Result<Self> {
         let path = paths.first().cloned().unwrap_or_default();
         let files = Files::list(paths, &limits)?;
-        let Found { catalogue, format, mut assumptions } = catalogue::find(&path, &files, options, &limits)?;
+        let Found { catalogue, format, mut assumptions, lists } =
+            catalogue::find(&path, &files, options, &limits)?;
         let directions = |angles: &[Angles]| angles.iter().map(|a| a.direction()).collect::<Vec<_>>();
         let (views, lights) = (directions(catalogue.views()), directions(catalogue.lights()));
         let images = catalogue.images();
@@ -88,7 +89,7 @@ impl Pictures {
         };
         let decoding = DecodeOptions { hdr_orientation: options.hdr_orientation };
         let bytes_in_use = images.iter().map(|&file| files.bytes_in_use(file)).max().unwrap_or(0);
-        let notes = notes_of(&files, images, catalogue.ignored() + files.hidden());
+        let notes = notes_of(&files, images, catalogue.ignored().saturating_sub(lists) + files.hidden());
         let PictureHeader { orientation, scanlines_are_columns, profile, remarks, .. } = header;
         Ok(Self {
             path,

@@ -6,6 +6,7 @@
 mod angular;
 pub mod archive_views;
 pub mod azimuth;
+pub mod background;
 pub(crate) mod duplicates;
 pub mod exposure;
 pub mod finding;
@@ -68,6 +69,7 @@ pub fn examine(statistics: &Statistics) -> Report {
     };
     if has_fault(&checks, samples::CONTRAST) {
         let names = [
+            background::NAME,
             samples::SATURATION,
             duplicates::NAME,
             radiometry::NAME,
@@ -79,6 +81,7 @@ pub fn examine(statistics: &Statistics) -> Report {
         checks.extend(put_off(&names, "no image shows anything"));
         return Report { checks };
     }
+    checks.push(background::check(statistics));
     checks.push(saturation);
     checks.push(duplicates::check(statistics));
     if has_fault(&checks, samples::SATURATION) {

@@ -9,6 +9,7 @@ use btfkit::words::counted;
 use clap::Args;
 
 use super::Console;
+use super::tile::steps;
 
 /// Fewer cells than this in a direction, and large pieces of an enlargement are copies.
 const FEW_CELLS: u64 = 4;
@@ -53,11 +54,16 @@ pub(super) fn print_appearance(report: &AppearanceReport, model: &Path, console:
     let levels = counted(report.levels.len(), "level");
     let counts = WaveCounts(report.lattice.clone());
     let cells = counts.cells();
+    let steps = report.found.parse().map_or_else(|_| report.found.clone(), |lattice| steps(&lattice));
     let lattice = match (report.found.as_str(), report.lattice.len()) {
         ("none", _) => "no lattice in it".to_owned(),
-        (found, 0) => format!("lattice {found}, not used: the exemplar is no whole number of its cells"),
-        (found, 1) => format!("ribs, a period of {found} texels (rows, columns), {cells} of them"),
-        (found, _) => format!("lattice of {found} texels (rows, columns), {cells} cells"),
+        (_, 0) => {
+            format!(
+                "a lattice with steps of {steps}, not used: the exemplar holds no whole number of its cells"
+            )
+        }
+        (_, 1) => format!("{cells} ribs, one each {steps}"),
+        (_, _) => format!("{cells} cells of a lattice, whose steps are {steps}"),
     };
     if console.brief {
         console.stage("exemplar", &format!("{width}x{height}; {lattice}"));

@@ -17,14 +17,14 @@ use super::source::SourceArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
 
-/// Look for mistakes of a measurement: swapped or mirrored directions, a wrong gamma, black, duplicate or misplaced
+/// Look for mistakes in a measurement: swapped or mirrored directions, a wrong gamma, black, duplicate or misplaced
 /// images
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf check wood.zarr
   btf check UBO_WOOD256.zip --picture wood.png
-  btf check felt.btf --azimuth mirrored             see whether this option repairs it
+  btf check felt.btf --azimuth mirrored             see whether this option repairs the fault
   btf check archives/*                              one line each, and a count
 The exit code is 65 if there is a fault. docs/how-to/check.md explains every check.")]
 pub(super) struct Check {
@@ -166,19 +166,33 @@ fn print_report(report: &Report, again: &str, console: Console) {
         console.line("");
         console.line(format!("{severity}: {} (confidence {:.2})", finding.code, finding.confidence));
         console.line(format!("  {}", finding.message));
-        console.line(format!("  evidence: {}", evidence(finding)));
+        console.line(format!("  evidence: {}", evidence(&finding.evidence)));
         if let Some(repair) = &finding.repair {
             console.line(format!("  repair:   btf import ... {again}{repair}"));
         }
     }
 }
 
-/// The evidence on one line, cut where lists make it long.
-fn evidence(finding: &Finding) -> String {
-    const LONGEST: usize = 400;
-    let text = finding.evidence.to_string();
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}... (--json tells all)", &text[..end]),
-        None => text,
+/// The evidence in words, on one line; of long lists the first few.
+fn evidence(value: &Value) -> String {
+    const LISTED: usize = 5;
+    let words = |name: &str| name.replace('_', " ");
+    match value {
+        Value::Object(members) => {
+            let members = members.iter().filter(|(_, value)| !value.is_null());
+            members
+                .map(|(name, value)| format!("{} {}", words(name), evidence(value)))
+                .collect::<Vec<_>>()
+                .join(", ")
+        }
+        Value::Array(list) => {
+            let mut shown: Vec<String> = list.iter().take(LISTED).map(evidence).collect();
+            if list.len() > LISTED {
+                shown.push(format!("and {} more (--json lists them)", list.len() - LISTED));
+            }
+            format!("({})", shown.join("; "))
+        }
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
     }
 }

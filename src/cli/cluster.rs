@@ -20,8 +20,8 @@ pub(super) struct ClusterOptions {
     /// Number of clusters [default: 256, or as many as the tile has texels]
     #[arg(long, group = "amount", value_parser = number::count)]
     clusters: Option<usize>,
-    /// Instead of --clusters: as few as leave a mean error of at most this, in units of lightness L*, between texels and
-    /// the measured texels that are stored for them
+    /// Instead of --clusters: the fewest clusters whose mean error is at most this, in units of lightness L*, between
+    /// texels and the measured texels that are stored for them
     #[arg(long, group = "amount", value_name = "L*", value_parser = number::positive)]
     error: Option<f64>,
     /// Instead of --clusters: as many as make the model N times smaller than the raw measurement
@@ -46,7 +46,7 @@ pub(super) struct ClusterOptions {
     /// cluster if that is more]
     #[arg(long, value_name = "TEXELS")]
     sample: Option<usize>,
-    /// Try N sets of first centres, and go on with the best
+    /// Try N sets of first centres, and continue with the best
     #[arg(long, default_value_t = 1, value_name = "N")]
     restarts: u32,
     /// Begin no further pass after this many seconds
@@ -110,8 +110,8 @@ Share the work between processes (exit code 66: a step before this one is not fi
   btf cluster wood.zarr plane.model.zarr --step assign --pass 0 --shard 0/8     ... 7/8
   btf cluster wood.zarr plane.model.zarr --step reduce --pass 0                 and so on with pass 1
 The reduce step that converges writes the model; further steps have nothing to do.
-Clusters are formed by lightness alone, so texels of different hues may share one. btf compare shows the difference
-in colour.")]
+Clusters are formed by lightness alone, so texels of different hues may share one. btf compare measures the resulting
+difference in colour.")]
 pub(super) struct Cluster {
     /// The measurement
     measurement: PathBuf,
@@ -285,7 +285,7 @@ pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
         let error = report.representative_lightness_error;
         let ratio = ratio(report.measurement_bytes);
         let text = format!(
-            "{}; mean weighted |dL*| {error:.3}, 1:{ratio:.0} of the raw measurement",
+            "{}; weighted mean |dL*| {error:.3} to representatives, 1:{ratio:.0} of the raw measurement",
             report.clusters
         );
         console.stage("clusters", &text);
@@ -297,7 +297,7 @@ pub(super) fn print_clusters(report: &cluster::Report, console: Console) {
     console.stage(
         "clusters",
         &format!(
-            "{} {how}; mean weighted |dL*| {error:.3} from centres, {:.3} from representatives",
+            "{} {how}; weighted mean |dL*| {error:.3} to centres, {:.3} to representatives",
             report.clusters, report.representative_lightness_error
         ),
     );

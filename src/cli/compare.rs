@@ -45,7 +45,7 @@ pub(super) struct Compare {
     /// Direction of the view, theta,phi in degrees
     #[arg(long, requires = "picture", default_value = "0,0", allow_hyphen_values = true)]
     view: Direction,
-    /// What of the model is compared [default: clusters, if it has them]
+    /// Which values of the model to compare [default: clusters, if it has them]
     #[arg(long, value_enum)]
     by: Option<ByName>,
     /// Of a packed model whose tile was cut: the model that it was packed from, which says where the tile lies
@@ -143,7 +143,8 @@ impl Compare {
             }
             console.text(&table(&rows));
             console.line(format!(
-                "CIEDE2000, its mean and what 95 % stay below, over {}, the other figures over all",
+                "CIEDE2000: its mean, and what 95 % stay below, over {}; the other figures are over all texels. All views \
+                 count alike here; btf model and btf info weight them by the cosine of theta",
                 counted(report.colour_texels, "texel")
             ));
             console.line(ledger_text(&subject.ledger));

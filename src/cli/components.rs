@@ -8,20 +8,20 @@ use clap::Args;
 
 use super::{Console, bytes_text};
 
-/// Find the mean and the principal components of a model's tile: values beside the clusters, sharper at equal size
+/// Find the principal components of a model's tile: they hold its values more sharply than clusters of the same size
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf components wood.zarr wood.model.zarr
   btf components wood.zarr wood.model.zarr --components 128    for a packed model of high quality
-A sum of products gives each value: mean + coefficients times basis, on the sRGB curve. `btf pack` makes one small file \
-of them.")]
+A value of a texel is the mean plus the sum of its coefficients times the basis, on the sRGB curve. `btf pack` writes \
+them as one small file, and `btf image --values components` shows them.")]
 pub(super) struct Components {
     /// The measurement
     measurement: PathBuf,
     /// The model with the tile
     model: PathBuf,
-    /// How many; fewer where the tile has no more
+    /// How many components; fewer if the tile has no more
     #[arg(long, value_name = "N", default_value_t = USUAL_COMPONENTS as u32)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=MOST_COMPONENTS as i64))]
     components: u32,

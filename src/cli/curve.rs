@@ -21,9 +21,9 @@ Examples:
   btf tile wood.zarr wood.model.zarr && btf curve wood.zarr wood.model.zarr
   btf curve wood.zarr wood.model.zarr --most 256 --picture curve.png
   btf curve wood.zarr wood.model.zarr --json > curve.json
-For 1, 2, 4 ... clusters: the weighted mean |dL*| of texels from their centres, the bytes of representatives and index,
-and how many times smaller they are than the raw measurement. Of a tile that does not fit in 192 MiB, a sample is
-clustered. The model stays as it is; choose a number, then run btf cluster --clusters N.")]
+For 1, 2, 4 ... clusters it prints the weighted mean |dL*| from texels to the centres of their clusters, the bytes of
+representatives and index, and how many times smaller than the raw measurement they are. If the tile does not fit in 192
+MiB, a sample of it is clustered. The model does not change; choose a number, then run btf cluster --clusters N.")]
 pub(super) struct Curve {
     /// The measurement
     measurement: PathBuf,

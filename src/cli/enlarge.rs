@@ -28,14 +28,14 @@ Examples:
   btf enlarge wood.model.zarr wood-4k.zarr --size 4096x4096
   btf enlarge wood.model.zarr other.zarr --size 1024x1024 --seed 2
   btf enlarge wood.model.zarr wood.zarr --size 2048x2048 --seed 1..8     makes wood-1.zarr to wood-8.zarr
-  btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      joins at its own borders
+  btf enlarge wood.model.zarr tile.zarr --size 1024x1024 --tileable      can be repeated without seams
   btf enlarge wood.model.zarr huge.zarr --size 65536x65536 --shard 3/8   one of eight jobs that share the work
   btf enlarge wood.model.zarr paper.zarr --size 1024x1024 --method paper the method of the paper
   btf enlarge wood.model.zarr laid.zarr --size 1024x1024 --method tiles --tiles 2    two tiles that join each other
   btf enlarge wood.model.zarr quilt.zarr --size 1024x1024 --method quilt image quilting
   btf enlarge models/*.model.zarr --into planes --size 2048x2048         many models, wood.enlarged.zarr and so on
-The same model, method, size and seed always give the same bytes, whatever the memory, threads, shards and
-interruptions. If it is interrupted, run the same command again: it goes on with what is missing.")]
+The same model, method, size and seed always give the same bytes. Memory, threads, shards and interruptions change
+nothing. If it is interrupted, run the same command again: it goes on with what is missing.")]
 pub(super) struct Enlarge {
     /// The model, and the enlargement to make [default: the model's name with .enlarged.zarr]; or many models. With
     /// several seeds, each output has its seed in its name
@@ -51,23 +51,23 @@ pub(super) struct Enlarge {
     #[arg(long, value_enum, default_value = "coherent")]
     method: Method,
     /// Seed of all random choices: another seed gives another piece of the same material. FIRST..LAST makes one output
-    /// for each seed, the last included
+    /// per seed, the last included
     #[arg(long, default_value = "1", value_parser = seeds, allow_hyphen_values = true)]
     seed: RangeInclusive<u64>,
-    /// Make an output that joins at its own borders (paper: nearly). Its sides must be multiples of a power of two
-    /// (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt); for any other size
-    /// the error names the nearest that fit
+    /// Make a surface that can be repeated without seams (with paper, nearly). Its sides must be multiples of a power of
+    /// two (coherent, paper), of the tile's sides (repeat, tiles) or of a part of them (roller, quilt). For any other
+    /// size, the error names the nearest sizes that fit
     #[arg(long)]
     tileable: bool,
     /// Make only part K of N, K from 0, so that N jobs share the work, in any order (all but paper, quilt); `env` takes
     /// both from the variables of Slurm or MPI
     #[arg(long, value_name = "K/N|env", default_value = "0/1")]
     shard: Shard,
-    /// How far pieces are shifted at random, from 0 to 1 (coherent). More repeats less; less fits better [default: 0.5,
-    /// and 0 for regular materials]
+    /// How far pieces are shifted at random, from 0 to 1 (coherent). With more, the surface repeats less; with less, the
+    /// pieces fit better [default: 0.5, and 0 for regular materials]
     #[arg(long, value_parser = number::jitter)]
     jitter: Option<u32>,
-    /// Do not store the array `source`, which says which texel of the tile each texel is (all but paper)
+    /// Do not store the array `source`, which says which texel of the tile each texel was copied from (all but paper)
     #[arg(long)]
     no_source: bool,
     /// Also store a normal map: the tile's normals, or (paper) those drawn from the field

@@ -24,9 +24,9 @@ Examples:
   btf export wood.zarr wood.btf --rank 100            for Bonn's viewers; exact, but large, without --rank
   btf export wood-4k.zarr wood.dzi --deepzoom --light 60,90 --format jpeg
                                                       tiles for OpenSeadragon and others, and wood.html to look at them
-Lossless are npy, PNG, HDF5, and EXR and Bonn's containers of halves or floats: importing them gives the same samples.
+npy, PNG, HDF5, and EXR and Bonn's containers of halves or floats are lossless: importing them gives the same samples.
 Deep Zoom shows measurements, models and enlargements of any size, as `btf image` does. If it is interrupted, run the
-same command again.")]
+same command again. --rank reads the measurement many times: minutes for a small one, hours for a large one.")]
 pub(super) struct Export {
     /// The measurement, or a packed model; with --deepzoom also a model or an enlargement
     store: PathBuf,

@@ -15,7 +15,7 @@ use clap::{Args, ValueEnum};
 use super::Console;
 use super::table::{row, table};
 
-/// Fit a random field to a model's normal map; needed for `btf enlarge --method paper` only
+/// Fit a random field to a model's normal map; only `btf enlarge --method paper` needs it
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -48,11 +48,12 @@ pub(super) struct FitOptions {
     /// What the field describes: the three components of the normals, or two slopes
     #[arg(long, value_enum, default_value = "normals")]
     field: Field,
-    /// How to scale levels: matched, so that their sum varies as much as the tile does; or none, as in the paper
+    /// How to scale the levels: so that their sum varies as much as the tile (matched), or not at all, as in the paper
+    /// (none)
     #[arg(long, value_enum, default_value = "matched")]
     gains: Gains,
-    /// Which distribution of the tile's normals is kept: the joint one of n_x and n_y (joint), that of each (channel),
-    /// or neither, as in the paper (none)
+    /// Which distribution of the tile's normals to keep: the joint one of n_x and n_y (joint), that of each of them
+    /// (channel), or none, as in the paper (none)
     #[arg(long, value_enum, default_value = "joint")]
     marginals: Marginals,
 }

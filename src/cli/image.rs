@@ -22,13 +22,13 @@ Examples:
   btf image wood.zarr --out wood.jpg --quality 95
   btf image --plane wood.model.zarr --window -500,12345,512,512 --out piece.png
                                                                       a part of the endless surface of a model
-A measured pair of directions shows the stored samples exactly (sRGB ones as they are); others are mixed in linear light
-from the three views and three lights around them.")]
+For a measured view and light, the picture shows the stored samples exactly. For others, values are interpolated in
+linear light from the three nearest views and the three nearest lights.")]
 pub(super) struct Image {
     /// A measurement, a model, an enlargement or a packed model
     source: PathBuf,
-    /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR take any size; JPEG has
-    /// at most 65535 pixels a side, WebP 16383, TIFF 4 GiB, and these three are put together in memory
+    /// The picture: .png, .jpg, .webp or .tif for displays, .exr for linear values. PNG and EXR may have any size.
+    /// JPEG has at most 65535 pixels a side, WebP 16383, and TIFF 4 GiB; these three must fit in memory
     #[arg(long, short)]
     out: PathBuf,
     /// Bits of each value; 16 for PNG and TIFF only

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use btfkit::error::Result;
+use btfkit::error::{Error, Result};
+use btfkit::lattice::Lattice;
 use btfkit::names::ends_with;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
@@ -20,6 +21,7 @@ use super::each::{Ended, Line, each};
 use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
+use super::tile::steps;
 use super::{Console, as_json, bytes_text};
 
 /// Show what an archive or a store holds, and how large an archive will be once imported
@@ -33,6 +35,7 @@ Examples:
   btf info UBO_WOOD256.zip
   btf info scans/ --pattern '{theta_v}_{phi_v}_{theta_i}_{phi_i}.png'
   btf info wood.zarr
+  btf info wood.zarr --directions                   the number and the angles of each view and light
   btf info wood.model.zarr --json
   btf info archives/*                               one line each, and a count")]
 pub(super) struct Info {
@@ -42,6 +45,10 @@ pub(super) struct Info {
     /// The archives are pieces of one measurement
     #[arg(long)]
     pieces: bool,
+    /// Also list the number and the angles of each view and light, as options such as --drop-view count them (--json has
+    /// them anyway)
+    #[arg(long, conflicts_with = "json")]
+    directions: bool,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -77,6 +84,7 @@ type Rows = Vec<Vec<String>>;
 impl Info {
     pub(super) fn run(&self, given: &Given, context: &Context<'_>, console: Console) -> Result<Ended> {
         if self.paths.len() > 1 && !self.pieces {
+            given.refuse_these(&["directions"], "of many inputs, which get one line each")?;
             let name = |path: &PathBuf| path.display().to_string();
             return each(&self.paths, name, self.json, context, console, |path| {
                 let told = self.look(std::slice::from_ref(path), given, context)?;
@@ -90,6 +98,9 @@ impl Info {
             console.plan(&as_json(&told)?)?;
         } else {
             console.text(&table(&rows(&told)));
+            if self.directions {
+                console.text(&table(&directions(&told)?));
+            }
         }
         Ok(Ended::Done)
     }
@@ -140,6 +151,32 @@ fn in_short(rows: &[Vec<String>]) -> String {
         _ => None,
     });
     told.collect::<Vec<_>>().join(", ")
+}
+
+/// A row for each view and each light: its number and its angles.
+fn directions(told: &Told) -> Result<Rows> {
+    let none = || {
+        Error::usage("--directions changes nothing here: there are no directions in it")
+            .hint("name a measurement, a model or an archive")
+    };
+    let [views, lights] = match told {
+        Told::Archive(archive) => [&archive.samples.views, &archive.samples.lights],
+        Told::Store(About::Measurement(about)) => [&about.samples.views, &about.samples.lights],
+        Told::Store(About::Model(about)) => {
+            let both = about.directions.as_ref().ok_or_else(none)?;
+            [&both.views, &both.lights]
+        }
+        _ => return Err(none()),
+    };
+    let mut rows = vec![row!["", "number", "theta", "phi"]];
+    for (name, list) in [("view", views), ("light", lights)] {
+        rows.extend(list.angles_deg.iter().enumerate().map(|(number, [theta, phi])| {
+            // What rounds to a whole turn is 0.
+            let phi = (phi * 100.0).round() / 100.0 % 360.0;
+            row![name, number, format!("{theta:.2}"), format!("{phi:.2}")]
+        }));
+    }
+    Ok(rows)
 }
 
 fn rows(told: &Told) -> Rows {
@@ -270,10 +307,12 @@ fn yes(is_so: bool) -> &'static str {
     if is_so { "yes" } else { "no" }
 }
 
-/// Pairs such as of a lattice, `dy,dx;dy,dx`.
-fn pairs<T: std::fmt::Display>(list: &[[T; 2]]) -> String {
-    let pairs: Vec<String> = list.iter().map(|[a, b]| format!("{a},{b}")).collect();
-    if pairs.is_empty() { "none".to_owned() } else { pairs.join(";") }
+/// A lattice in words, and as `--lattice` takes it.
+fn lattice_text(lattice: &Lattice) -> String {
+    match lattice {
+        Lattice::None => "none".to_owned(),
+        _ => format!("steps of {} (--lattice '{lattice:.2}')", steps(lattice)),
+    }
 }
 
 /// A value of a recipe for people.
@@ -311,7 +350,7 @@ fn of_model(about: &Modelled) -> Rows {
                 rows.extend(about.measurement.iter().map(|digest| row!["  measurement's digest", digest]));
                 rows.push(row!["  borders join", yes(tile.wraps)]);
                 rows.extend(asked("tile", "tile").map(|tile| row!["  asked for", tile]));
-                rows.push(row!["  lattice", pairs(&tile.lattice.vectors())]);
+                rows.push(row!["  lattice", lattice_text(&tile.lattice)]);
                 rows.push(row!["  seam visibility", format!("{:.2}", tile.seam_visibility)]);
             }
             "cluster" => {
@@ -320,7 +359,7 @@ fn of_model(about: &Modelled) -> Rows {
                 rows.extend(report.taken_from.iter().map(|(name, _)| row!["  taken from", name]));
                 for (number, pass) in report.passes.iter().enumerate() {
                     let found = format!(
-                        "mean weighted |dL*| {:.4}, {} moved",
+                        "weighted mean |dL*| {:.4} to centres, {} moved",
                         pass.mean_lightness_error,
                         counted(pass.moved, "texel")
                     );
@@ -372,13 +411,15 @@ fn of_model(about: &Modelled) -> Rows {
                     bytes_text(report.tile_bytes)
                 );
                 rows.push(row!["  arrays", text]);
+                rows.extend(report.texts.iter().map(|(name, text)| row![format!("  {name}"), text]));
             }
             _ => {
                 let Some(report) = &about.appearance else { continue };
                 let [y, x, height, width] = report.exemplar;
                 rows.push(row!["  exemplar", format!("{width}x{height} from {x},{y}")]);
                 rows.push(row!["  levels", report.levels.len()]);
-                rows.push(row!["  lattice", report.found]);
+                let lattice = report.found.parse().map(|lattice| lattice_text(&lattice));
+                rows.push(row!["  lattice", lattice.unwrap_or_else(|_| report.found.clone())]);
             }
         }
         rows.extend(asked(done.stage, "seed").map(|seed| row!["  seed", seed]));

@@ -15,7 +15,7 @@ use super::given::expect_in_order;
 use super::table::{row, table};
 use super::{Console, as_json};
 
-/// Rate how near an enlargement is to the real material: 1 is as near as another real piece of it
+/// Measure how much an enlargement differs from the real material; at 1 it could be another real piece
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -24,7 +24,8 @@ Examples:
   btf judge wood-4k.zarr --against wood.zarr --json > judged.json
   btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless surface of a model
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
-J is the worst of five measures; 1 is as near as another real crop. docs/how-to/judge.md says what each measure sees.")]
+J is the largest of five measures of the difference from real crops. At 1, the enlargement differs from them as much as
+they differ from each other. docs/how-to/judge.md explains the measures.")]
 pub(super) struct Judge {
     /// An enlargement, or a model with --size
     subject: PathBuf,
@@ -38,8 +39,8 @@ pub(super) struct Judge {
     /// How much of the endless surface of a model to judge, WIDTHxHEIGHT, each from 1 to 16777216
     #[arg(long, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Judge under this view and light, by their numbers from 0; repeat the option for more [default: five pairs
-    /// spread over the directions]
+    /// Judge under this view and light, by their numbers from 0, which btf info --directions lists; repeat the option for
+    /// more [default: five pairs spread over the directions]
     #[arg(long, value_name = "VIEW,LIGHT", value_parser = pair, allow_hyphen_values = true)]
     pair: Vec<[usize; 2]>,
     /// Side of the crops in texels, a multiple of 16 [default: 128, or as large as fit]

@@ -65,7 +65,7 @@ Examples:
   btf image big.zarr --light 15,0 --view 0,0 --out big.png
 Each command has its own help: btf import --help, or man btf-import (see btf man --help).
 
-Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else is at the place of the result;
+Exit codes: 0 done; 1 failed; 2 wrong usage; 65 damaged input, or something else has the name of the result;
 66 input not there yet; 74 the system refuses to read or write; 75 stopped on request (run the same command again).
 The book is in docs/; docs/README.md says where to begin.";
 
@@ -101,7 +101,7 @@ struct Common {
     /// How to show progress
     #[arg(long, global = true, value_enum, default_value = "auto")]
     progress: ProgressStyle,
-    /// Replace results that exist, also those of other options. Without it, nothing that exists is ever replaced
+    /// Replace results that exist, also those made with other options. Without it, nothing that exists is ever replaced
     #[arg(long, global = true)]
     force: bool,
     /// Print nothing but errors
@@ -113,7 +113,7 @@ struct Common {
 enum ProgressStyle {
     /// Bars on a terminal; elsewhere a line every half minute.
     Auto,
-    /// One JSON object a line on standard error, for schedulers; errors too.
+    /// One JSON object per line on standard error, for schedulers; errors too.
     Json,
     /// Nothing.
     None,

@@ -81,6 +81,7 @@ impl Model {
             let stage = progress::Stage { number, of: Stage::ALL.len(), name: stage.name() };
             context.progress.stage(Some(stage));
         };
+        context.tell_follow_up();
         context.tell_enough(plan.enough_for_model(
             &cluster_options(measurement, model, &self.cluster, self.seed.seed),
             context.threads,

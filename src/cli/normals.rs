@@ -12,7 +12,7 @@ use super::given::expect_in_order;
 
 #[derive(Args)]
 pub(super) struct NormalsOptions {
-    /// Leave out lights that are shadows or highlights at a texel
+    /// At each texel, leave out the lights under which it is in shadow or shows a highlight
     #[arg(long)]
     robust: bool,
 }

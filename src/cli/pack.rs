@@ -10,7 +10,7 @@ use clap::Args;
 use super::bytes::parse_bytes;
 use super::{Console, as_json, bytes_text, found, number};
 
-/// Pack the components of a model into one small file, some thousand times smaller than the samples of its tile
+/// Pack the components of a model into one small file, about a thousand times smaller than the samples of its tile
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -18,16 +18,16 @@ Examples:
   btf pack wood.model.zarr wood.btfc --quality 1:580           sharper
   btf pack wood.model.zarr wood.btfc --quality 40kB
   btf pack wood.model.zarr wood.btfc --quality 34dB --licence CC-BY-4.0 --texel-mm 0.25
-`btf components` makes the components, `btf info` tells what the file holds, `btf unpack` makes a model of it again. A file \
-that is cut behind any of the planes that `btf info` lists is a coarser model.")]
+`btf components` finds the components, `btf info` says what the file holds, and `btf unpack` makes a model of it again. \
+The file can be cut after any of the byte counts that `btf info` lists: what is left is a coarser model.")]
 pub(super) struct Pack {
     /// The model with components
     model: PathBuf,
     /// The file to write: NAME.btfc
     #[arg(value_name = "FILE")]
     output: PathBuf,
-    /// At most so many bytes (40000, 40kB, 40KiB), so many times smaller than the tile's samples (1:2000), or at least so
-    /// good (34dB)
+    /// How small: at most this many bytes (40000, 40kB, 40KiB), or this many times smaller than the tile's samples
+    /// (1:2000). Or how good: at least this peak signal-to-noise ratio (34dB)
     #[arg(long, value_name = "BYTES|1:RATIO|DB", default_value = "1:2000")]
     quality: QualityArg,
     /// Licence of the material, kept in the file
@@ -90,19 +90,17 @@ impl Pack {
             report.psnr_db.map_or("not known".to_owned(), |psnr| format!("{psnr:.2} dB")),
             report.made.map_or("", found)
         ));
-        if report.components == report.components_of_model {
+        if let Some(more) = report.more {
             console.notes(&[format!(
-                "all {} of the model are in the file; more of them (btf components --components {} --force) may serve the \
-                 same bytes better",
-                counted(report.components, "component"),
-                2 * report.components
+                "all {} of the model are in the file; at the same size, more of them may be nearer to the measurement: {more}",
+                counted(report.components, "component")
             )]);
         }
         Ok(())
     }
 }
 
-/// Make a model of a packed one, with a tile and components: `btf image` shows it, `btf compare` compares it
+/// Make a model of a packed file: its tile and its components, which `btf image` shows
 #[derive(Args)]
 #[command(after_help = "\
 Example:

@@ -14,11 +14,51 @@ const LINE_INTERVAL: Duration = Duration::from_secs(1);
 /// Least time between two lines for people, and before the first one.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(30);
 
+/// Stages of one name that follow each other, as the passes of one computation do: what one takes, the next takes too.
+#[derive(Default)]
+struct Alike(Mutex<Option<(Stage, Instant)>>);
+
+impl Alike {
+    /// Takes note of a stage that begins; seconds that are left for it and all that follow, if that can be told.
+    fn left(&self, stage: Stage) -> Option<f64> {
+        let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match *first {
+            Some((begun, at))
+                if begun.name == stage.name && begun.of == stage.of && begun.number < stage.number =>
+            {
+                Some(rest(at.elapsed().as_secs_f64(), begun, stage))
+            }
+            _ => {
+                *first = Some((stage, Instant::now()));
+                None
+            }
+        }
+    }
+}
+
+/// Seconds that a stage and those after it take, where those from `begun` on took `elapsed`.
+fn rest(elapsed: f64, begun: Stage, stage: Stage) -> f64 {
+    let done = stage.number.saturating_sub(begun.number).max(1);
+    elapsed / done as f64 * (stage.of + 1).saturating_sub(stage.number) as f64
+}
+
+/// A time for people: `50 s`, `4 min`.
+fn duration(seconds: f64) -> String {
+    if seconds < 100.0 { format!("{seconds:.0} s") } else { format!("{:.0} min", seconds / 60.0) }
+}
+
+/// `stage 2 of 18: factorise, about 4 min left in all`.
+fn with_left(stage: Stage, left: Option<f64>) -> String {
+    let left = left.map_or(String::new(), |left| format!(", about {} left in all", duration(left)));
+    format!("{stage}{left}")
+}
+
 /// A bar on the terminal for the step under way.
 #[derive(Default)]
 pub(super) struct Bars {
     bar: Mutex<Option<ProgressBar>>,
-    stage: Mutex<Option<Stage>>,
+    stage: Mutex<Option<(Stage, String)>>,
+    alike: Alike,
 }
 
 impl Bars {
@@ -44,10 +84,10 @@ impl Progress for Bars {
                 "{prefix:>20} {bar:32} {bytes}/{total_bytes} ({bytes_per_sec}, {eta} left) {wide_msg}"
             }
         };
-        let stage = *self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        let stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let prefix = match stage {
-            Some(stage) if stage.name == title => stage.to_string(),
-            Some(stage) => format!("{stage}, {title}"),
+            Some((stage, told)) if stage.name == title => told,
+            Some((_, told)) => format!("{told}, {title}"),
             None => title.to_owned(),
         };
         self.end();
@@ -65,12 +105,13 @@ impl Progress for Bars {
 
     fn stage(&self, stage: Option<Stage>) {
         self.end();
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
+        let told = stage.map(|stage| (stage, with_left(stage, self.alike.left(stage))));
+        self.stage.lock().unwrap_or_else(PoisonError::into_inner).clone_from(&told);
         // Until its first step begins, and where it has none.
-        let Some(stage) = stage else { return };
+        let Some((_, told)) = told else { return };
         let style = ProgressStyle::with_template("{prefix} {spinner}");
         let style = style.unwrap_or_else(|_| ProgressStyle::default_spinner());
-        self.show(ProgressBar::new_spinner().with_style(style).with_prefix(stage.to_string()));
+        self.show(ProgressBar::new_spinner().with_style(style).with_prefix(told));
     }
 
     fn advance(&self, count: u64) {
@@ -107,6 +148,8 @@ impl Progress for Bars {
 pub(super) struct Plain {
     step: Mutex<Option<Step>>,
     stage: Mutex<Option<Stage>>,
+    alike: Alike,
+    left: Mutex<Option<f64>>,
     told: Mutex<Option<Instant>>,
 }
 
@@ -119,7 +162,9 @@ impl Plain {
         }
         *told = Some(Instant::now());
         if let Some(step) = &*self.step.lock().unwrap_or_else(PoisonError::into_inner) {
-            let _ = writeln!(std::io::stderr(), "btf: {}", escaped(&step.in_words()));
+            let left = *self.left.lock().unwrap_or_else(PoisonError::into_inner);
+            let left = left.map_or(String::new(), |left| format!("; about {} left in all", duration(left)));
+            let _ = writeln!(std::io::stderr(), "btf: {}{left}", escaped(&step.in_words()));
         }
     }
 }
@@ -150,6 +195,8 @@ impl Progress for Plain {
     }
 
     fn stage(&self, stage: Option<Stage>) {
+        *self.left.lock().unwrap_or_else(PoisonError::into_inner) =
+            stage.and_then(|stage| self.alike.left(stage));
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = stage;
     }
 
@@ -271,6 +318,21 @@ impl Progress for Lines {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn stages_that_are_alike_tell_what_is_left_of_all_of_them() {
+        let alike = Alike::default();
+        let stage = |number, name| Stage { number, of: 4, name };
+        assert!(alike.left(stage(1, "factorise")).is_none());
+        assert!(alike.left(stage(2, "factorise")).is_some());
+        assert!((rest(10.0, stage(1, "factorise"), stage(2, "factorise")) - 30.0).abs() < 1e-9);
+        assert_eq!(
+            with_left(stage(2, "factorise"), Some(120.0)),
+            "stage 2 of 4: factorise, about 2 min left in all"
+        );
+        // Stages of other work take other times.
+        assert!(alike.left(stage(3, "cluster")).is_none());
+    }
 
     #[test]
     fn a_line_says_which_part_of_what_is_done() {

@@ -18,7 +18,7 @@ use super::{Console, found, number};
 /// Longest side of a picture, pixels.
 const MOST_SIDE: usize = 65_535;
 
-/// Show a material on an object: a sphere, a car interior, your own mesh, under lights or an environment
+/// Show a material on an object: a sphere, a car interior or your own mesh, under lights or an environment
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -29,9 +29,9 @@ Examples:
   btf render wood.model.zarr --shape plane --frames 36 --light-sweep --shard 0/4 --out sweep.jpg
   btf render wood.model.zarr --shape interior --compare --out methods.png
   btf render wood.btfc --out packed.png
-The world: x to the right, y up, z towards a camera in its default place; the object lies around the origin, its radius
-is 1. A light of 1 shows a perfect diffuser that it meets frontally as white, as in `btf image`. Light that surfaces
-reflect onto each other is left out.")]
+Coordinates: x to the right, y up, z towards the default camera. The object lies around the origin and has a radius of 1.
+One light shows a perfect white diffuser that faces it as white, as in `btf image`. Light that one surface reflects onto
+another is not computed.")]
 pub(super) struct Render {
     /// A model or a packed model, whose tile is shown, or an enlargement
     source: PathBuf,
@@ -48,14 +48,15 @@ pub(super) struct Render {
     /// Show it on a mesh instead: .obj or .glb, with texture coordinates. It is moved and scaled to a radius of 1
     #[arg(long, value_name = "FILE", conflicts_with = "shape")]
     mesh: Option<PathBuf>,
-    /// Size of the texture on the object, from 0.01 to 100; at 1, the radius of the object has 256 texels
+    /// Size of the texture on the object, from 0.01 to 100; at 1, the radius of the object is 256 texels long
     #[arg(long, default_value_t = 1.0, value_parser = number::scale, allow_hyphen_values = true)]
     scale: f64,
     /// A light far away, theta,phi in degrees: theta from the axis towards the default camera, phi counter-clockwise
     /// from the right. May be repeated [default: 45,120, unless there are other lights]
     #[arg(long, allow_hyphen_values = true, value_name = "THETA,PHI")]
     light: Vec<Direction>,
-    /// A light at a point. Its brightness falls with the square of the distance, and is 1 at the origin. May be repeated
+    /// A light at a point. Its brightness falls with the square of the distance; at the origin it is that of --light. May
+    /// be repeated
     #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = number::place)]
     point_light: Vec<[f64; 3]>,
     /// Light from all around: a latitude-longitude picture, .exr or .hdr, whose middle lies behind the object
@@ -65,7 +66,7 @@ pub(super) struct Render {
     #[arg(long, requires = "environment", default_value_t = 0.0, value_parser = number::turn)]
     #[arg(allow_hyphen_values = true)]
     environment_turn: f64,
-    /// Number of lights that stand for the environment; more make softer shadows
+    /// Approximate the environment by N directional lights; more make softer shadows
     #[arg(long, requires = "environment", default_value = "64", value_name = "N")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=4096))]
     environment_lights: u32,
@@ -75,16 +76,16 @@ pub(super) struct Render {
     /// Grey behind the object, linear
     #[arg(long, default_value_t = 0.18, value_parser = number::grey, allow_hyphen_values = true)]
     background: f64,
-    /// Do not let parts of the object hide light from each other
+    /// Cast no shadows: parts of the object do not hide light from each other
     #[arg(long)]
     no_shadows: bool,
     /// Place of the camera [default: by the shape]
     #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = number::place)]
     eye: Option<[f64; 3]>,
-    /// What the camera looks at [default: 0,0,0]
+    /// What the camera looks at [default: 0,0,0, or the middle of the interior]
     #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = number::place)]
     target: Option<[f64; 3]>,
-    /// What is upright in the picture [default: 0,1,0]
+    /// Which way is up in the picture [default: 0,1,0]
     #[arg(long, allow_hyphen_values = true, value_name = "X,Y,Z", value_parser = number::place)]
     up: Option<[f64; 3]>,
     /// Field of view: the angle that the shorter side of the picture covers, degrees [default: 30]
@@ -93,7 +94,7 @@ pub(super) struct Render {
     /// Parallel rays: no perspective
     #[arg(long)]
     orthographic: bool,
-    /// Rays a pixel, from 1 to 4096: more make smoother edges and finer textures [default: 16; 1 for --shape flat]
+    /// Rays per pixel, from 1 to 4096: more make smoother edges and finer textures [default: 16; 1 for --shape flat]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
     samples: Option<u32>,
     /// Brightness: a factor on the linear values, above 0
@@ -102,13 +103,13 @@ pub(super) struct Render {
     /// Quality of a JPEG, 1 to 100 [default: 90]
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=100))]
     quality: Option<u8>,
-    /// Make so many pictures of a motion: --turntable or --light-sweep
+    /// Make N pictures of a motion: --turntable or --light-sweep
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
     /// The object turns once about the vertical axis
     #[arg(long, requires = "frames")]
     turntable: bool,
-    /// Lights go once round the axis to the default camera
+    /// Lights move once around the axis that points to the default camera
     #[arg(long, requires = "frames", conflicts_with = "turntable")]
     light_sweep: bool,
     /// Make only part K of N of the pictures, K from 0, so that N jobs share them; `env` takes both from the variables
@@ -147,7 +148,7 @@ fn size(text: &str) -> std::result::Result<Size, String> {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum ShapeName {
-    /// Seen from afar along the normal, a pixel a texel at scale 1
+    /// Seen from the front, without perspective: one pixel per texel at scale 1
     Flat,
     /// A square
     Plane,

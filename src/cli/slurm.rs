@@ -21,7 +21,7 @@ const PARTS: usize = 8;
 #[command(after_help = "\
 Examples:
   btf slurm wall.btf --size 65536x65536                   scripts in slurm/; read them, then slurm/submit.sh
-  btf slurm ubo2014/*.zip --into stores --size 4096x4096  many materials: one array a stage, one task a material
+  btf slurm ubo2014/*.zip --into stores --size 4096x4096  many materials: one array per stage, one task per material
   btf slurm wall.zarr --tile none --cluster-parts 8       a measurement; eight jobs share each pass of the clustering
   btf slurm wall.btf --partition long --account lab --sbatch=--qos=low --submit
 The scripts are for users to read and edit: settings.sh holds what they work on. submit.sh submits them, status.sh shows

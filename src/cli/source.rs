@@ -22,7 +22,7 @@ pub(super) struct SourceArgs {
     /// Convert samples to this type [default: keep theirs]
     #[arg(long, value_enum)]
     samples: Option<SampleName>,
-    /// Which polar angles of the archive are elevations: 90 degrees is from above, not theta, where 0 is
+    /// Which polar angles of the archive are elevations, where 90 degrees is straight above; theta is 0 there
     #[arg(long, value_enum)]
     polar: Option<Polar>,
     /// Which azimuths of the archive run clockwise
@@ -34,7 +34,7 @@ pub(super) struct SourceArgs {
     /// Exchange rows and columns of the images
     #[arg(long)]
     transpose: bool,
-    /// Exchange light and view, if the archive has them the wrong way round
+    /// Exchange light and view, which the archive has the wrong way round
     #[arg(long)]
     swap: bool,
     /// Say `excluded` if the cosine of the light angle was divided out; it is then multiplied in
@@ -55,10 +55,10 @@ pub(super) struct SourceArgs {
     /// Say `atrium` if the scan lines of Radiance pictures that name X first are rows, from the bottom up
     #[arg(long, value_parser = ["rules", "atrium"])]
     hdr: Option<String>,
-    /// Leave out the view of this number, from 0; repeat the option for more
+    /// Leave out the view of this number, from 0 (btf info --directions lists them); repeat the option for more
     #[arg(long, value_name = "N")]
     drop_view: Vec<usize>,
-    /// Leave out the light of this number, from 0; repeat the option for more
+    /// Leave out the light of this number, from 0 (btf info --directions lists them); repeat the option for more
     #[arg(long, value_name = "N")]
     drop_light: Vec<usize>,
 }

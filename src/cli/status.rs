@@ -16,7 +16,7 @@ Only the disk is looked at, and no sample is read: btf verify looks for damage.
 
 Examples:
   btf status wood.zarr
-  btf status stores/*.zarr --json       one object a line
+  btf status stores/*.zarr --json       one object per line
 The exit code is 0 if everything is there, and 66 if something is missing.")]
 pub(super) struct StatusOf {
     /// Measurements, models and enlargements; each gets one line

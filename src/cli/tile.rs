@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use btfkit::error::Result;
-use btfkit::lattice::{LatticeChoice, WaveCounts};
+use btfkit::lattice::{Lattice, LatticeChoice, WaveCounts};
 use btfkit::run::Context;
 use btfkit::stage::tile;
 use btfkit::store::{measurement, model};
@@ -9,6 +9,27 @@ use clap::Args;
 
 use super::Console;
 use super::given::expect_in_order;
+
+/// Share of a tile that is black from everywhere, and is warned of.
+const MUCH_BLACK: f64 = 0.25;
+
+/// The steps of a lattice in words: `13.0 rows and 21.3 columns`.
+pub(super) fn steps(lattice: &Lattice) -> String {
+    let step = |[dy, dx]: [f64; 2]| {
+        let [rows, columns] = [dy, dx].map(|length| format!("{:.1}", length.abs()));
+        match (rows.as_str(), columns.as_str()) {
+            (_, "0.0") => format!("{rows} rows"),
+            ("0.0", _) => format!("{columns} columns"),
+            // Rows grow downwards.
+            _ => {
+                let way = if (dy < 0.0) == (dx < 0.0) { "right" } else { "left" };
+                format!("{rows} rows down with {columns} columns to the {way}")
+            }
+        }
+    };
+    let steps: Vec<String> = lattice.vectors().into_iter().map(step).collect();
+    if steps.is_empty() { "none".to_owned() } else { steps.join(" and ") }
+}
 
 /// Of a plane of which the tile is less than this, more is worth having.
 const LITTLE: f64 = 0.5;
@@ -105,17 +126,24 @@ pub(super) fn print_tile(report: &tile::Report, console: Console) {
     };
     console.stage("tile", &format!("{width}x{height} {seams}"));
     let lattice = &report.lattice;
+    let steps = steps(lattice);
     let cells = WaveCounts(report.cells.clone()).cells();
     match lattice.vectors().len() {
         0 => {}
         _ if cells == 0 => {
-            console.line(format!("          holds no whole number of cells of the lattice {lattice:.1}"));
+            console.line(format!(
+                "          holds no whole number of cells of the lattice, whose steps are {steps}"
+            ));
         }
-        1 => console
-            .line(format!("          holds {cells} ribs, a period of {lattice:.1} texels (rows, columns)")),
-        _ => console.line(format!(
-            "          holds {cells} cells of the lattice {lattice:.1} texels (rows, columns)"
-        )),
+        1 => console.line(format!("          holds {cells} ribs, one each {steps}")),
+        _ => console.line(format!("          holds {cells} cells of a lattice, whose steps are {steps}")),
+    }
+    if report.black > MUCH_BLACK {
+        console.line(format!(
+            "          warning: {:.0} % of it is black from everywhere, a backdrop or a mask: crop the pictures to the material \
+             and import them again",
+            100.0 * report.black
+        ));
     }
     let [texels, all] = [report.size, report.measurement_size].map(|[height, width]| (height * width) as f64);
     if texels < LITTLE * all {

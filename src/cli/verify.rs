@@ -116,10 +116,14 @@ fn text_of(found: &Found) -> String {
             (table(&rows), &report.findings, &report.notes)
         }
     };
-    for Finding { part, what, todo, missing } in findings {
+    for (number, Finding { part, what, todo, missing }) in findings.iter().enumerate() {
         let word = if *missing { "missing" } else { "damaged" };
         text.push_str(&format!("\n{word}: {}: {}", escaped(part), escaped(what)));
-        if let Some(todo) = todo {
+        // What is to be done about several that follow each other is said once, and of the last at the very end.
+        let next = findings.get(number + 1).map(|next| &next.todo);
+        let is_said =
+            next == Some(todo) || next.is_none() && findings.first().map(|first| &first.todo) == Some(todo);
+        if let Some(todo) = todo.as_ref().filter(|_| !is_said) {
             text.push_str(&format!("\n  {}", escaped(todo)));
         }
     }

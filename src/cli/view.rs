@@ -9,14 +9,14 @@ use clap::Args;
 
 use super::{Console, bytes_text, found};
 
-/// Look at a material in a browser: move the light, turn it, walk over an endless surface
+/// Look at a material in a browser: move the light, turn the material, walk over an endless surface
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   btf view wood.model.zarr --open                   in your browser, until you press Ctrl-C
   btf view wood.model.zarr --export wood.html       one file, for others; it needs no network
   btf view wood-4k.zarr --export part.html --window 512,0,1024,1024
-The page is served to this machine alone. It needs a browser of 2023 or newer, with WebGL 2.")]
+Only this machine can open the served page. It needs a browser of 2023 or newer, with WebGL 2.")]
 pub(super) struct View {
     /// A model or an enlargement
     source: PathBuf,
@@ -27,7 +27,7 @@ pub(super) struct View {
     /// or in the current folder]
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Of an enlargement, the part that the page holds: x,y,width,height in texels, at most 1024 a side
+    /// The part of an enlargement that the page holds: x,y,width,height in texels, at most 1024 a side
     #[arg(long, allow_hyphen_values = true)]
     window: Option<Area>,
     /// Port to serve the page on [default: any that is free]

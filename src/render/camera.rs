@@ -4,18 +4,18 @@ use crate::error::{Error, Result};
 use crate::shape::Size;
 use crate::vector::{Vector, along, cross, minus, unit};
 
-/// How a camera stands and what it sees.
+/// Position, direction and field of view of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Where it is.
+    /// Its position.
     pub eye: Vector,
-    /// What is in the middle of the picture.
+    /// The point in the middle of the picture.
     pub target: Vector,
-    /// What is upright in the picture.
+    /// The direction that points up in the picture.
     pub up: Vector,
     /// Angle that the shorter side of the picture covers, degrees.
     pub fov_deg: f64,
-    /// Whether rays are parallel; then the shorter side covers what it would at the target.
+    /// Whether rays are parallel; the shorter side then covers the same length as it would at the target.
     pub orthographic: bool,
 }
 
@@ -34,7 +34,7 @@ pub struct Camera {
     right: Vector,
     up: Vector,
     forward: Vector,
-    /// Pixels are so far apart, at distance 1 from the eye or, of parallel rays, in the world.
+    /// Distance between pixels: at distance 1 from the eye or, if rays are parallel, in world lengths.
     step: f64,
     size: Size,
 }

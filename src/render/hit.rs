@@ -3,16 +3,16 @@
 use super::camera::Ray;
 use crate::vector::{Vector, along, cross, dot, unit};
 
-/// Nearer than this, a ray meets what it left.
+/// Hits nearer than this are ignored: the ray has just left that surface.
 pub(super) const NEAR: f64 = 1e-7;
 
-/// Directions along the texture, and out of the surface; each of length 1, at right angles. Where the texture is
-/// mirrored they are left-handed.
+/// Three unit vectors at right angles to each other: two along the texture, and one out of the surface. They are
+/// right-handed, but left-handed where the texture is mirrored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// Where columns grow.
+    /// The direction in which columns increase.
     pub right: Vector,
-    /// Where rows fall.
+    /// The direction in which rows decrease: up in the texture.
     pub up: Vector,
     /// Out of the surface.
     pub out: Vector,
@@ -21,27 +21,27 @@ pub struct Frame {
 /// Where a ray meets a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
-    /// From the ray's origin.
+    /// Distance from the ray's origin.
     pub distance: f64,
-    /// In the world.
+    /// The point, in world coordinates.
     pub point: Vector,
-    /// Normal of the surface itself, on the side of the ray's origin.
+    /// Geometric normal of the surface, on the side from which the ray comes.
     pub normal: Vector,
-    /// Along the texture.
+    /// The frame of the texture there.
     pub frame: Frame,
-    /// Place in the texture, to the right and up; lengths.
+    /// Texture coordinates there, to the right and up, in world lengths.
     pub place: [f64; 2],
 }
 
 impl Frame {
-    /// The frame of a normal and the direction in which columns grow; `mirrored` where rows fall the other way.
+    /// The frame of a normal and of the direction in which columns increase; `mirrored` if rows decrease the other way.
     pub(super) fn new(out: Vector, right: Vector, mirrored: bool) -> Option<Self> {
         let right = unit(along(right, -dot(right, out), out))?;
         let up = cross(out, right);
         Some(Self { right, up: if mirrored { up.map(|value| -value) } else { up }, out })
     }
 
-    /// A direction of the world in this frame.
+    /// A direction, given in world coordinates, in this frame.
     #[inline]
     pub(super) fn local(&self, direction: Vector) -> Vector {
         [dot(direction, self.right), dot(direction, self.up), dot(direction, self.out)]
@@ -49,7 +49,7 @@ impl Frame {
 }
 
 impl Hit {
-    /// Turns a surface that is seen from behind towards the ray: what is seen there is the same material.
+    /// Turns the frame towards the ray if the surface is seen from behind: both sides show the same material.
     pub(super) fn facing(mut self, ray: &Ray) -> Self {
         if dot(self.normal, ray.direction) > 0.0 {
             self.normal = self.normal.map(|value| -value);

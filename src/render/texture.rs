@@ -1,4 +1,4 @@
-//! Textures that a scene looks up: in memory, or made and read piece by piece as they are asked for.
+//! Textures of a scene: in memory, or made or read piece by piece when they are needed.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,7 +19,7 @@ pub enum Texture {
     Whole {
         /// Rows and columns.
         size: Size,
-        /// Whether it repeats; else its border goes on.
+        /// Whether it repeats; if not, its outermost texels are continued.
         wraps: bool,
         /// As many as the size says.
         index: Vec<u32>,
@@ -31,7 +31,7 @@ pub enum Texture {
 /// Makes or reads the entries of an area, row by row.
 pub type Maker = Box<dyn Fn(Area) -> Result<Vec<u32>> + Send + Sync>;
 
-/// A texture of which only the pieces that were asked for last are kept.
+/// A texture of which only the most recently used pieces are kept.
 pub struct Pieces {
     make: Maker,
     /// Its size and whether it repeats; none where it is endless.
@@ -54,7 +54,7 @@ struct Piece {
 }
 
 impl Pieces {
-    /// A texture that `make` makes, of which at most so many bytes are kept, and a piece at least.
+    /// A texture made by `make`, of which at most so many bytes are kept, but at least one piece.
     pub fn new(make: Maker, bounds: Option<(Size, bool)>, bytes: u64) -> Self {
         let most = (bytes / PIECE_BYTES).max(1) as usize;
         Self { make, bounds, most, kept: Mutex::default() }
@@ -90,7 +90,7 @@ impl Pieces {
 }
 
 impl Texture {
-    /// For one thread to read it with.
+    /// A reader for one thread.
     pub fn reader(&self) -> Reader<'_> {
         Reader { texture: self, last: None, beyond: false }
     }
@@ -100,7 +100,7 @@ impl Texture {
 pub struct Reader<'a> {
     texture: &'a Texture,
     last: Option<([i64; 2], Arc<Piece>)>,
-    /// Whether something beyond the border of a texture that does not repeat was asked for.
+    /// Whether a texel beyond the border of a texture that does not repeat was needed.
     pub beyond: bool,
 }
 

@@ -62,7 +62,7 @@ pub struct Rendered {
     pub beyond: bool,
 }
 
-/// Makes a picture of `samples` rays a pixel, the same bytes whatever the threads.
+/// Makes a picture of `samples` rays per pixel, the same bytes whatever the threads.
 ///
 /// # Errors
 /// Those of reading the texture, and a stop.

@@ -39,6 +39,7 @@ pub struct Context<'a> {
     pub existing: Existing,
     memory_by_system: bool,
     memory_enough: AtomicU64,
+    follows_up: AtomicBool,
     computing: Arc<AtomicBool>,
     pool: rayon::ThreadPool,
 }
@@ -64,6 +65,7 @@ impl<'a> Context<'a> {
             existing: Existing::Keep,
             memory_by_system: false,
             memory_enough: AtomicU64::new(0),
+            follows_up: AtomicBool::new(false),
             computing: Arc::default(),
             pool,
         })
@@ -90,6 +92,16 @@ impl<'a> Context<'a> {
     /// Takes note of what is enough for all that is to be done, so that it is told at once where memory is short.
     pub fn tell_enough(&self, bytes: u64) {
         self.memory_enough.store(bytes, Ordering::Relaxed);
+    }
+
+    /// Takes note that every usual stage of a model follows in this run, so that none of them need be asked for.
+    pub fn tell_follow_up(&self) {
+        self.follows_up.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether that was told.
+    pub(crate) fn follows_up(&self) -> bool {
+        self.follows_up.load(Ordering::Relaxed)
     }
 
     /// An error of kind `Stopped` once a stop has been asked for.

@@ -44,6 +44,8 @@ pub struct Directions {
     pub count: usize,
     /// The least and the largest theta, degrees.
     pub theta_deg: [f64; 2],
+    /// Theta and phi of each, degrees, in the order of their numbers.
+    pub angles_deg: Vec<[f64; 2]>,
 }
 
 impl Directions {
@@ -51,8 +53,18 @@ impl Directions {
     pub fn of(list: &[Direction]) -> Self {
         let thetas = list.iter().map(|d| d.degrees().0);
         let (low, high) = thetas.fold((f64::MAX, f64::MIN), |(low, high), t| (low.min(t), high.max(t)));
-        Self { count: list.len(), theta_deg: [low, high] }
+        let angles_deg = list.iter().map(|direction| direction.degrees().into()).collect();
+        Self { count: list.len(), theta_deg: [low, high], angles_deg }
     }
+}
+
+/// View and light directions.
+#[derive(Clone, Debug, Serialize)]
+pub struct Both {
+    /// View directions.
+    pub views: Directions,
+    /// Light directions.
+    pub lights: Directions,
 }
 
 /// What a measurement is, or an archive as a measurement.
@@ -136,6 +148,9 @@ pub struct Modelled {
     pub kept: Kept,
     /// Digest of the measurement that it was made of.
     pub measurement: Option<String>,
+    /// Its view and light directions, once it has a tile.
+    #[serde(flatten)]
+    pub directions: Option<Both>,
     /// Stages in the order of the data flow.
     pub stages: Vec<Done>,
     /// How the tile was cut.
@@ -254,6 +269,10 @@ fn of_model(model: &Model, kept: impl Fn(u64, bool) -> Kept) -> Result<Modelled>
             .then(|| model.recipe::<TileRecipe>(Stage::Tile))
             .transpose()?
             .map(|recipe| recipe.measurement),
+        directions: is_there(Stage::Tile)
+            .then(|| model.directions())
+            .transpose()?
+            .map(|[views, lights]| Both { views: Directions::of(&views), lights: Directions::of(&lights) }),
         tile: is_there(Stage::Tile).then(|| model.tile_report()).transpose()?,
         cluster: is_there(Stage::Cluster).then(|| model.cluster_report()).transpose()?,
         normals: is_there(Stage::Normals).then(|| model.normals_report()).transpose()?,

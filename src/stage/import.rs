@@ -96,6 +96,18 @@ pub fn plan<'a>(source: &'a dyn Source, options: Options, context: &Context<'_>)
     Ok(Plan { source, options, description, recipe })
 }
 
+/// A recipe for people to read: of long lists, such as those of directions, only how much is in them.
+fn shortened(recipe: Value) -> Value {
+    /// More than that is nobody's to read.
+    const LONGEST: usize = 8;
+    match recipe {
+        Value::Array(list) if list.len() > LONGEST => format!("{} entries", list.len()).into(),
+        Value::Array(list) => list.into_iter().map(shortened).collect(),
+        Value::Object(members) => members.into_iter().map(|(name, value)| (name, shortened(value))).collect(),
+        other => other,
+    }
+}
+
 impl Plan<'_> {
     /// What would be done, for people and schedulers.
     pub fn summary(&self) -> Value {
@@ -111,7 +123,7 @@ impl Plan<'_> {
             "unit": "view",
             "units": self.views().count(),
             "unit_memory_bytes": self.unit_bytes(),
-            "recipe": self.recipe.to_value().unwrap_or_default(),
+            "recipe": shortened(self.recipe.to_value().unwrap_or_default()),
         })
     }
 

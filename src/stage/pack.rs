@@ -21,7 +21,7 @@ use crate::stage::components::Report as ComponentsReport;
 use crate::stage::image::of_stage;
 use crate::store::model::components::{ComponentsRecipe, Found, raw_bytes};
 use crate::store::model::tile::{TileRecipe, TileReport};
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Stage, UNPACKED};
 pub use crate::store::packed::{ENDING, is_packed};
 use crate::store::packed::{
     LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
@@ -66,10 +66,16 @@ pub struct Packed {
     pub components_of_model: usize,
     /// Peak signal-to-noise ratio to the samples, dB.
     pub psnr_db: Option<f64>,
+    /// The commands that give it more components, where all that the model has are in it and there can be more.
+    #[serde(skip)]
+    pub more: Option<String>,
     /// Whether it was there already.
     #[serde(skip)]
     pub made: Option<Made>,
 }
+
+/// Those that a model holds in its tile.
+const OF_THE_TILE: [&str; 3] = [SAMPLES, TRANSFER, MEASUREMENT];
 
 /// The curve's name in a packed model.
 fn transfer_name(transfer: Transfer) -> &'static str {
@@ -98,12 +104,18 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
     let mut whole = unpacked_model(&model)?;
     whole.texts.extend(options.licence.iter().map(|licence| (LICENCE.to_owned(), licence.clone())));
     whole.texts.extend(options.texel_mm.iter().map(|side| (TEXEL_MM.to_owned(), side.to_string())));
+    // What the file said that the components were unpacked from, unless it is said anew.
+    for (name, text) in &report.texts {
+        if !whole.texts.iter().any(|(there, _)| there == name) {
+            whole.texts.push((name.clone(), text.clone()));
+        }
+    }
     if report.squared_error.is_none() && matches!(options.quality, Quality::Decibels(_)) {
         return Err(Error::usage(format!(
             "{}: its components come from a packed file, so it is not known how far they are from the measurement",
             options.model.display()
         ))
-        .hint("ask for bytes or a ratio, or find the components of the measurement: btf components"));
+        .hint("ask for bytes or a ratio, or pack the model that the file was made of"));
     }
     let target = match options.quality {
         Quality::Bytes(bytes) => packed::Target::Bytes(usize::try_from(bytes).unwrap_or(usize::MAX)),
@@ -115,7 +127,21 @@ pub fn pack(options: &Options, context: &Context<'_>) -> Result<Packed> {
         .compute(|| packed::pack(&whole, report.squared_error, target))
         .map_err(|error| Error::usage(format!("{}: {error}", options.model.display())))?;
     let made = output::prepare_bytes(&options.output, context.existing, &file.bytes)?.publish()?;
+    let twice = 2 * report.components;
+    // Not of components that were unpacked: there is no measurement to find more in.
+    let can_have_more = report.squared_error.is_some()
+        && file.components == report.components
+        && twice <= whole.texels().min(whole.brdf());
+    let more = can_have_more.then(|| {
+        format!(
+            "{} --components {twice} --force, then btf pack {} {} --force with the same --quality",
+            model.command(Stage::Components),
+            options.model.display(),
+            options.output.display()
+        )
+    });
     Ok(Packed {
+        more,
         bytes: file.bytes.len() as u64,
         tile_bytes: report.tile_bytes,
         components: file.components,
@@ -294,7 +320,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
     let PackedFile { description, digest, .. } = opened;
     let (size, transfer) = (description.size, description.transfer);
     let model = Model::create(path, context)?;
-    let named = named.unwrap_or_else(|| format!("packed:{digest}"));
+    let named = named.unwrap_or_else(|| format!("{UNPACKED}{digest}"));
     let tile = if from.wraps { "periodic" } else { "none" }.to_owned();
     let tile_recipe = TileRecipe { measurement: named, tile, seed: 1, lattice: None }.to_value()?;
     if let Some(_lock) = model.begin(Stage::Tile, &tile_recipe, context)? {
@@ -310,6 +336,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
             measurement_size: from.size,
             lattice: Lattice::default(),
             cells: vec![],
+            black: 0.0,
         };
         model.write_directions(&description)?;
         model.write_tile(&Tile::whole(size, from.wraps))?;
@@ -356,6 +383,7 @@ pub fn unpack(file: &Path, path: &Path, context: &Context<'_>) -> Result<Restore
         psnr_db,
         bytes: model.bytes_of_components(components)?,
         tile_bytes: description.bytes(),
+        texts: from.texts.into_iter().filter(|(name, _)| !OF_THE_TILE.contains(&name.as_str())).collect(),
     };
     model.finish(Stage::Components, &recipe, &report, context)?;
     Ok(done(false))

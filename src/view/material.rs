@@ -61,8 +61,11 @@ pub(super) fn read(options: &Options, context: &Context<'_>) -> Result<Material>
             model
         }
         _ => {
-            return Err(Error::usage(format!("{}: got a measurement, expected a model", path.display()))
-                .hint(format!("make a model of it: btf model {}", path.display())));
+            return Err(Error::usage(format!(
+                "{}: got a measurement, expected a model or an enlargement",
+                path.display()
+            ))
+            .hint(format!("make a model of it first: btf model {} NAME.model.zarr", path.display())));
         }
     };
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -75,7 +78,10 @@ pub(super) fn read(options: &Options, context: &Context<'_>) -> Result<Material>
     if model.has(Stage::Appearance)? {
         put_appearance(&mut container, &model.appearance()?);
     } else {
-        notes.push("the model has no endless surface: `btf appearance` makes what it needs".to_owned());
+        notes.push(format!(
+            "the model has no endless surface; to make it: {}",
+            model.how_to_make(Stage::Appearance)
+        ));
     }
     Ok(Material { name, container, notes })
 }

@@ -450,19 +450,28 @@ fn a_tile_that_is_mostly_black_is_warned_of() {
         let [store, model, large] = ["", ".model", ".large"].map(|kind| at(&format!("{name}{kind}.zarr")));
         succeed(btf().arg("import").args([&array, &store]));
         let plain = ["--tile", "none", "--clusters", "16", "--levels", "1"];
-        succeed(btf().arg("model").args([&store, &model]).args(plain));
-        succeed(btf().arg("enlarge").args([&model, &large]).args(["--size", "96x96"]))
+        let made = succeed(btf().arg("model").args([&store, &model]).args(plain));
+        let checked = btf().arg("check").arg(&store).output().unwrap();
+        let checked = String::from_utf8_lossy(&checked.stdout).into_owned();
+        [made, checked, succeed(btf().arg("enlarge").args([&model, &large]).args(["--size", "96x96"]))]
     };
-    assert!(!enlarged("plain").contains("are black"));
+    let plain = enlarged("plain").concat();
+    assert!(
+        !["are black", "is black from", "black-background"].iter().any(|words| plain.contains(words)),
+        "{plain}"
+    );
     // Three of four columns become black in every image.
     let mut bytes = std::fs::read(&array).unwrap();
     let header = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     for (at, sample) in bytes[header..].iter_mut().enumerate() {
         if at / 3 % 56 >= 14 {
-            *sample = 0;
+            // Noise, as JPEG leaves it.
+            *sample = 2 * (at % 3) as u8;
         }
     }
     std::fs::write(&array, bytes).unwrap();
-    let told = enlarged("black");
+    let [made, checked, told] = enlarged("black");
+    assert!(made.contains("75 % of it is black from everywhere"), "{made}");
+    assert!(checked.contains("black-background") && checked.contains("crop the pictures"), "{checked}");
     assert!(told.contains("75 % of the tile are black") && told.contains("crop the pictures"), "{told}");
 }

@@ -62,6 +62,16 @@ fn a_line_of_a_list_that_leads_nowhere_is_named() {
 }
 
 #[test]
+fn a_list_that_was_read_is_not_one_of_the_files_that_are_ignored() {
+    let mut files = three(["a.png", "b.png", "c.png"]);
+    files.push(("l.lp", list(["a.png", "b.png", "c.png"]).into_bytes()));
+    let (_folder, root) = set(&files);
+    assert!(!told(&root).contains("ignored"), "{}", told(&root));
+    fs::write(root.join("notes.txt"), "x").unwrap();
+    assert!(told(&root).contains("1 other file ignored"), "{}", told(&root));
+}
+
+#[test]
 fn pictures_that_are_left_out_are_named() {
     let mut files = three(["tl10 pl0 tv0 pv0.png", "tl20 pl0 tv0 pv0.png", "tl30 pl0 tv0 pv0.png"]);
     files.push(("tl40 pl0 tv0.png", png(1)));

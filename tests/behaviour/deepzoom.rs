@@ -364,3 +364,18 @@ fn the_page_describes_the_picture_and_asks_for_nothing_else() {
     assert!(page.contains(r#""width":530"#) && page.contains(r#""height":700"#), "{page}");
     assert!(!page.contains("http"), "the page names an address");
 }
+
+#[test]
+fn what_is_to_be_done_about_missing_tiles_is_said_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("p.dzi");
+    succeed(&mut export(&fixture().enlarged(), &output));
+    let tiles = std::fs::read_dir(folder.path().join("p_files/10")).unwrap();
+    let removed = tiles.take(4).map(|tile| std::fs::remove_file(tile.unwrap().path()).unwrap()).count();
+    let found = btf().arg("verify").arg(&output).output().unwrap();
+    assert_eq!(found.status.code(), Some(66));
+    let [told, error] =
+        [found.stdout, found.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    assert_eq!(told.matches("no such tile").count(), removed, "{told}");
+    assert_eq!([told, error].concat().matches("it goes on where it stopped").count(), 1);
+}

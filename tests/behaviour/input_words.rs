@@ -26,7 +26,7 @@ fn a_pattern_that_fits_no_name_is_told_with_a_name_and_a_bad_one_is_wrong_use() 
     let mut drop = btf();
     drop.arg("info").arg(&root).args(["--pattern", "a_{theta_i}_{phi_i}.png", "--drop-view"]);
     let said = fail(drop.arg("99"), 2);
-    assert!(said.contains("no view 99 to drop, there are 1"), "{said}");
+    assert!(said.contains("there is no view 99 to drop: views are numbered 0 to 0"), "{said}");
 }
 
 #[test]

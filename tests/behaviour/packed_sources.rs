@@ -75,7 +75,7 @@ fn a_flat_object_is_the_picture_by_components_too() {
     refused("c.btfc", &["--plane"], 2, ["packed model", "its tile only"]);
     refused("c.btfc", &["--model", "c.model.zarr"], 2, ["packed model", "its own values"]);
     let model = fixture().model();
-    refused(model.to_str().unwrap(), &by_components, 66, ["run `btf components`", ""]);
+    refused(model.to_str().unwrap(), &by_components, 66, ["run btf components", ""]);
     succeed(btf().arg("unpack").args([&at("c.btfc"), &at("u.model.zarr")]));
     let told = succeed(
         btf().arg("render").arg(at("u.model.zarr")).args(["--size", "9x9"]).arg("--out").arg(at("u.png")),

@@ -166,7 +166,7 @@ pub(super) fn sizes(figures: &Figures) -> Section {
             row(enlarged, with_enlarged_index, whole.to_owned(), ledger.measurement),
             row(enlarged, with_enlarged_index, "the enlarged BTF, raw".to_owned(), ledger.enlarged),
             row(
-                "as the paper counts: an index of 4 bytes a texel",
+                "as the paper counts: an index of 4 bytes per texel",
                 as_in_paper,
                 "ten tiles, raw".to_owned(),
                 10 * ledger.tile,
@@ -175,9 +175,9 @@ pub(super) fn sizes(figures: &Figures) -> Section {
     };
     let note = format!(
         "<p>One model gives all of these ratios, so a ratio means nothing unless it says what was counted. \
-         Raw means {} bytes a texel: 8-bit RGB under all pairs of directions. The paper states \
+         Raw means {} bytes per texel: 8-bit RGB under all pairs of directions. The paper states \
          \"approximately 1/200\". It compares ten tiles of 2.4 GB in all (137 × 142 texels each, which would be \
-         3.8 GB raw) with 9.3 MB: representatives, and an index of 4 bytes a texel for 1024 × 1024 texels. Only \
+         3.8 GB raw) with 9.3 MB: representatives, and an index of 4 bytes per texel for 1024 × 1024 texels. Only \
          the last row counts in that way.</p>",
         ledger.texel
     );

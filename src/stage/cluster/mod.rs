@@ -14,7 +14,6 @@ mod representatives;
 mod reuse;
 mod stream;
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -29,7 +28,6 @@ use crate::method::cluster::points::Arrangement;
 use crate::method::cluster::selection::{Order, Selection};
 use crate::method::cluster::tally::Tally;
 use crate::method::tile::Tile;
-use crate::names::with_ending;
 use crate::run::Context;
 use crate::run::recipe::{self, Recipe};
 use crate::run::shard::Shard;
@@ -38,7 +36,7 @@ use crate::store::measurement::Measurement;
 use crate::store::model::clusters::ClusterRecipe;
 pub use crate::store::model::clusters::{ClusterReport as Report, Ended};
 use crate::store::model::tile::TileRecipe;
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Stage, measurement_name};
 use crate::store::origin;
 use crate::words::counted;
 pub(crate) use budget::enough_bytes;
@@ -182,6 +180,13 @@ pub(crate) fn open_measurement_of(model: &Model, path: &Path) -> Result<Measurem
 pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Result<()> {
     let (expected, found) = (measurement_of(model)?, measurement.digest());
     let Some(expected) = expected.filter(|expected| expected != found) else { return Ok(()) };
+    if model.is_unpacked() {
+        let (model, measurement) = (model.path().display(), measurement.path().display());
+        return Err(Error::recipe(format!(
+            "{model}: btf unpack made this model of a part of a measurement, and its file does not say which part"
+        ))
+        .hint(format!("make a model of the measurement: btf model {measurement} NAME.model.zarr")));
+    }
     let [expected, found] = [expected.as_str(), found].map(recipe::shortened);
     // Where the model says that its measurement lies, another one is the same imported anew.
     let real = |path: &Path| path.canonicalize().ok();
@@ -199,11 +204,6 @@ pub(crate) fn expect_measurement(model: &Model, measurement: &Measurement) -> Re
          measurement (digest {expected}, now {found})"
     ))
     .hint(todo))
-}
-
-/// The name that the measurement of a model has by default: `wood.zarr` of `wood.model.zarr`.
-pub(crate) fn measurement_name(model: &Path) -> OsString {
-    with_ending(model, &[".model.zarr", ".zarr"], ".zarr")
 }
 
 /// Checks options against the tile.

@@ -2,6 +2,7 @@
 
 mod pass;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
@@ -213,6 +214,7 @@ impl Plan {
             bytes: self.model.bytes_of_components(components)?,
             tile_bytes: description.bytes() / description.size.texels() as u64
                 * self.tile.size.texels() as u64,
+            texts: BTreeMap::new(),
         };
         self.model.finish(Stage::Components, &self.recipe, &report, context)?;
         Ok(report)

@@ -10,6 +10,7 @@ use crate::likeness::verdict::{Tally, Verdict as Counted, WINDOW_SIDE, excess_pe
 use crate::shape::Size;
 use crate::stage::judge::frontal_pair;
 use crate::store::enlarged::{Enlarged, Method};
+use crate::store::model::Stage;
 
 /// Shares of clusters in common below which rare parts of the material are being lost.
 const LEAST_SHARES: f64 = 0.9;
@@ -80,8 +81,25 @@ impl Subject {
              whole plane)"
         };
         let mut verdict = Verdict { counted: tally.verdict(), excess_peak, black, warnings: Vec::new() };
-        verdict.warnings = verdict.warnings(method, more, &self.model.path().display().to_string());
+        verdict.warnings = verdict.warnings(method, more, &self.lattice_advice()?);
         Ok(Some(verdict))
+    }
+
+    /// What to do where an enlargement is less regular than its tile.
+    fn lattice_advice(&self) -> Result<String> {
+        let found = if self.model.has(Stage::Appearance)? {
+            self.model.appearance_report()?.found
+        } else {
+            "none".to_owned()
+        };
+        let why = match found.as_str() {
+            "none" => {
+                "no lattice was found, or none was wanted; if you know the steps of its cells, name them"
+            }
+            _ => "the lattice that was found may be wrong; if you know the steps of its cells, name them",
+        };
+        let model = self.model.path().display();
+        Ok(format!("{why} (btf appearance {model} --force --lattice 'dy,dx;dy,dx')"))
     }
 
     /// Share of the texels of a tile whose clusters are black from everywhere.
@@ -106,8 +124,9 @@ impl Subject {
 }
 
 impl Verdict {
-    /// What is wrong, each with what to do; `more` is how to come by a larger tile, `model` where the model lies.
-    fn warnings(&self, method: Method, more: &str, model: &str) -> Vec<String> {
+    /// What is wrong, each with what to do: `more` is how to come by a larger tile, `lattice` what to do about order that
+    /// is lost.
+    fn warnings(&self, method: Method, more: &str, lattice: &str) -> Vec<String> {
         let coherent = method == Method::Coherent;
         let advise = |advice: String| if coherent { advice } else { "take --method coherent".to_owned() };
         let mut warnings = Vec::new();
@@ -119,13 +138,10 @@ impl Verdict {
             ));
         }
         if self.excess_peak < -MOST_EXCESS {
-            let advice = format!(
-                "if the material is regular, name its lattice (btf appearance {model} --force --lattice 'dy,dx;dy,dx')"
-            );
             warnings.push(format!(
-                "the tile is more regular by {:.2}: {}",
+                "it is less regular than the tile by {:.2}: {}",
                 -self.excess_peak,
-                advise(advice)
+                advise(lattice.to_owned())
             ));
         }
         if self.black > MOST_BLACK {
@@ -153,8 +169,11 @@ mod tests {
     fn each_fault_has_its_warning_and_none_is_none() {
         let of = |shares, excess_peak, largest_copy, method| {
             let counted = Counted { shares, largest_copy };
-            Verdict { counted, excess_peak, black: 0.0, warnings: Vec::new() }
-                .warnings(method, "more", "m.zarr")
+            Verdict { counted, excess_peak, black: 0.0, warnings: Vec::new() }.warnings(
+                method,
+                "more",
+                "name its lattice: --lattice",
+            )
         };
         let coherent = |shares, peak, copy| of(shares, peak, copy, Method::Coherent);
         assert!(coherent(0.95, 0.0, Some(0.02)).is_empty());

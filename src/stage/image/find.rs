@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, ErrorKind, Result};
-use crate::stage::cluster::{measurement_name, open_measurement_of};
+use crate::stage::cluster::open_measurement_of;
 use crate::store::enlarged::Enlarged;
 use crate::store::measurement::Measurement;
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Stage, measurement_name};
 use crate::store::origin;
 
 /// The measurement that a model was made of; where it is not named, it is looked for where it lay then as seen from the
@@ -54,39 +54,61 @@ pub(crate) fn model_of(enlarged: &Enlarged, place: &Path, named: Option<&Path>) 
     let stages = enlarged.method().stages();
     let open = |path: &Path| {
         let model = Model::open(path)?;
+        if let Some(&lost) = stages.iter().rev().find(|&&stage| !model.has(stage).unwrap_or(true)) {
+            let todo = format!("{}, then {}", model.how_to_make(lost), again(enlarged, place, path));
+            return Err(changed(place, path).hint(todo));
+        }
         if enlarged.recipe().model == model.digest_of(stages)? {
             return Ok(model);
         }
-        Err(Error::recipe(format!(
-            "{} was enlarged from another model than {}",
-            place.display(),
-            path.display()
+        Err(changed(place, path).hint(format!(
+            "name the model as it was with --model; or, to have it of the model as it is now: {}",
+            again(enlarged, place, path)
         )))
     };
     if let Some(path) = named {
-        return open(path).map_err(|error| error.hint("--model names the model that it was enlarged from"));
+        return open(path);
     }
     let places = origin::places(place, origin::MODEL, enlarged.model_name());
     let error = match found_at(&places, open) {
         Ok(model) => return Ok(model),
-        Err(failed) => failed.unwrap_or_else(|| {
-            Error::missing(format!(
-                "{}: the model that it was enlarged from is not there; looked for {}",
-                place.display(),
-                listed(&places)
-            ))
-        }),
+        Err(Some(error)) => return Err(error),
+        Err(None) => Error::missing(format!(
+            "{}: the model that it was enlarged from is not there; looked for {}",
+            place.display(),
+            listed(&places)
+        )),
     };
     Err(error.hint("name the model with --model"))
+}
+
+/// The error of an enlarged index whose model is not what it was.
+fn changed(place: &Path, model: &Path) -> Error {
+    Error::recipe(format!(
+        "{} was enlarged from another model than {}, or from this one before it was changed",
+        place.display(),
+        model.display()
+    ))
+}
+
+/// The command that makes an enlarged index of its model as it is now.
+fn again(enlarged: &Enlarged, place: &Path, model: &Path) -> String {
+    let size = enlarged.size();
+    let method = format!("{:?}", enlarged.method()).to_lowercase();
+    format!(
+        "btf enlarge {} {} --size {}x{} --method {method} --force",
+        model.display(),
+        place.display(),
+        size.width,
+        size.height
+    )
 }
 
 /// Reads what a stage of a model left; where that is not there, the error says which command makes it.
 pub(crate) fn of_stage<T>(model: &Model, stage: Stage, read: impl FnOnce(&Model) -> Result<T>) -> Result<T> {
     model.stage_digest(stage)?;
     read(model).map_err(|error| match error.kind() {
-        ErrorKind::Missing => {
-            error.hint(format!("run `btf {}` on the model: it makes again what is missing", stage.name()))
-        }
+        ErrorKind::Missing => error.hint(format!("{} makes again what is missing", model.command(stage))),
         _ => error,
     })
 }

@@ -198,8 +198,11 @@ fn pairs_of(options: &Options, measurement: &Measurement) -> Result<Vec<[usize; 
     let (views, lights) = (description.views.len(), description.lights.len());
     match options.pairs.iter().find(|&&[view, light]| view >= views || light >= lights) {
         Some([view, light]) => Err(Error::usage(format!(
-            "got the pair {view},{light}, expected a view below {views} and a light below {lights}: `btf info` lists them"
-        ))),
+            "got the pair {view},{light}, expected a view from 0 to {} and a light from 0 to {}",
+            views.saturating_sub(1),
+            lights.saturating_sub(1)
+        ))
+        .hint(format!("btf info {} --directions lists them", measurement.path().display()))),
         None if options.pairs.is_empty() => {
             Ok(pairs::spread(&description.views, &description.lights, pairs::COUNT))
         }

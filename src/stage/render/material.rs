@@ -45,15 +45,7 @@ pub(super) fn open(options: &Options, room: &mut Room, context: &Context<'_>) ->
     if pack::is_packed(path) {
         return of_packed(options, room, context);
     }
-    let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND]).map_err(|error| {
-        match crate::store::kind_of(path) {
-            Ok(kind) => {
-                Error::usage(format!("{} is a {kind}, expected a model or an enlargement", path.display()))
-                    .hint("make a model of a measurement first: btf model")
-            }
-            Err(_) => error,
-        }
-    })?;
+    let attributes = Store::at(path).expect_one_of(&[model::KIND, enlarged::KIND])?;
     let kind = attributes.get("kind").and_then(Value::as_str).unwrap_or_default();
     if kind != model::KIND && options.plane.is_some() {
         return Err(Error::usage(format!(

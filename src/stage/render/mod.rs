@@ -22,6 +22,7 @@ use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::image::PlaneOptions;
 use crate::stage::values::By;
+use crate::store::{kind_of, model};
 use crate::vector::{Vector, length};
 use crate::words::counted;
 
@@ -30,7 +31,7 @@ pub use sheets::compare;
 /// Texels along a length of 1, the radius of an object, at scale 1.
 pub(crate) const DENSITY: f64 = 256.0;
 
-/// Rays a pixel, unless their number is given.
+/// Rays per pixel, unless their number is given.
 const SAMPLES: u32 = 16;
 
 /// Memory of a pixel while its picture is made and written.
@@ -39,7 +40,7 @@ const PIXEL_BYTES: u64 = 32;
 /// What a material is shown on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shape {
-    /// Seen from afar along the normal, a pixel a texel at scale 1.
+    /// Seen from the front, without perspective: one pixel per texel at scale 1.
     Flat,
     /// A square of side 2.
     Plane,
@@ -75,7 +76,7 @@ pub struct EnvironmentOptions {
     pub path: PathBuf,
     /// Turned about the vertical axis by this, degrees.
     pub turn_deg: f64,
-    /// So many lights stand for it.
+    /// It is approximated by so many directional lights.
     pub lights: usize,
     /// Whether it is seen behind the object.
     pub seen: bool,
@@ -105,7 +106,7 @@ pub struct Options {
     pub shape: Shape,
     /// Size of the picture.
     pub size: Size,
-    /// Rays a pixel; as the shape needs where absent.
+    /// Rays per pixel; as the shape needs where absent.
     pub samples: Option<u32>,
     /// Lights far away.
     pub lights: Vec<Direction>,
@@ -222,17 +223,21 @@ pub fn run(options: &Options, output: &Path, encoding: Encoding, context: &Conte
     }
     context.progress.end();
     if beyond {
-        report.notes.push(beyond_note(material.bounds));
+        report.notes.push(beyond_note(options, material.bounds));
     }
     Ok(report)
 }
 
 /// What is told where an object shows more than a texture has.
-fn beyond_note(bounds: Option<(Size, bool)>) -> String {
+fn beyond_note(options: &Options, bounds: Option<(Size, bool)>) -> String {
     let (size, _) = bounds.unwrap_or((Size::new(0, 0), false));
+    let more = match kind_of(&options.source) {
+        Ok(model::KIND) => "choose a larger --scale, or --plane for a surface that never ends",
+        Ok(_) => "choose a larger --scale, or make a larger enlargement",
+        Err(_) => "choose a larger --scale",
+    };
     format!(
-        "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; \
-         choose a larger --scale, a larger enlargement, or --plane"
+        "the object is larger than the texture, which has {size} texels and does not repeat: its border goes on; {more}"
     )
 }
 

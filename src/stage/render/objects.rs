@@ -17,7 +17,10 @@ use crate::shape::Size;
 const FOV_DEG: f64 = 30.0;
 
 /// The same of the interior, which is wider than it is high.
-const INTERIOR_FOV_DEG: f64 = 21.0;
+const INTERIOR_FOV_DEG: f64 = 22.0;
+
+/// The middle of the interior as its default camera sees it.
+const INTERIOR_MIDDLE: [f64; 3] = [0.045, 0.0, 0.0];
 
 /// How far the default camera is: the sphere of radius 1 fills nine tenths of the picture.
 const DISTANCE: f64 = 4.3;
@@ -28,7 +31,7 @@ pub(super) struct Laid {
     pub(super) density: f64,
     /// Place in the texture of what is at 0, 0 on the surface.
     pub(super) origin: [f64; 2],
-    /// Rays a pixel.
+    /// Rays per pixel.
     pub(super) samples: u32,
 }
 
@@ -88,7 +91,11 @@ pub(super) fn view(options: &Options, surface: &Surface) -> View {
     };
     View {
         eye: chosen.eye.unwrap_or(eye),
-        target: chosen.target.unwrap_or([0.0; 3]),
+        target: chosen.target.unwrap_or(if options.shape == Shape::Interior {
+            INTERIOR_MIDDLE
+        } else {
+            [0.0; 3]
+        }),
         up: chosen.up.unwrap_or([0.0, 1.0, 0.0]),
         fov_deg: chosen.fov_deg.unwrap_or(fov_deg),
         orthographic: chosen.orthographic || flat,

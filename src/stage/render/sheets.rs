@@ -129,7 +129,7 @@ pub fn compare(
             .hint(notes.join("; ")));
     }
     let (top, left) = place(count, options.size);
-    canvas.text(top, left, "the tile, a pixel a texel");
+    canvas.text(top, left, "the tile, one pixel per texel");
     scene.surface = Object::Endless;
     let tile = exposed(subject.flat_tile(&mut scene)?, options.exposure);
     canvas.put(top + LINE, left, &tile.as_display());
@@ -166,7 +166,7 @@ impl Subject<'_> {
         let camera = Camera::new(objects::view(options, &scene.surface), options.size)?;
         let material = (&self.evaluator, texture);
         let rendered = crate::render::render(scene, &camera, material, options.size, samples, self.context)?;
-        Ok((rendered.picture, rendered.beyond.then(|| beyond_note(bounds))))
+        Ok((rendered.picture, rendered.beyond.then(|| beyond_note(options, bounds))))
     }
 
     /// As much of the tile as a panel holds.

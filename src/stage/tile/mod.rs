@@ -17,12 +17,12 @@ use crate::run::budget::OWN_BYTES;
 use crate::run::recipe::Recipe;
 use crate::run::{Context, Existing};
 use crate::shape::Size;
-use crate::stage::cluster::{expect_measurement, measurement_name};
+use crate::stage::cluster::expect_measurement;
 use crate::stage::{cluster, fit};
 use crate::store::measurement::{Description, Measurement};
 pub use crate::store::model::tile::TileReport as Report;
 use crate::store::model::tile::{TileRecipe, cells};
-use crate::store::model::{Model, Stage};
+use crate::store::model::{Model, Stage, measurement_name};
 use crate::store::origin;
 use features::lattice_of;
 
@@ -128,6 +128,24 @@ pub fn enough_for_model(
     clustering.max(OWN_BYTES + memory_bytes(description).max(fit::memory_bytes(texels)))
 }
 
+/// Share of a tile's texels that are black under all directions that are looked at, as a backdrop is; none where
+/// nothing is much lighter.
+fn black(features: &Features, tile: &Tile) -> f64 {
+    /// L* codes of a backdrop, of 255: the noise of a black one stays below.
+    const BLACK: u8 = 12;
+    /// An L* code that something else has.
+    const LIGHT: u8 = 60;
+    if features.codes.iter().all(|&code| code < LIGHT) {
+        return 0.0;
+    }
+    let width = features.size.width;
+    let is_black = |&&[row, column]: &&[u32; 2]| {
+        let at = (row as usize * width + column as usize) * features.count;
+        features.codes[at..at + features.count].iter().all(|&code| code <= BLACK)
+    };
+    tile.source.iter().filter(is_black).count() as f64 / tile.source.len().max(1) as f64
+}
+
 /// Memory that choosing a tile of a measurement takes.
 fn memory_bytes(description: &Description) -> u64 {
     description.size.texels() as u64 * (TEXEL_BYTES + description.lights.len() as u64)
@@ -185,6 +203,7 @@ impl Plan {
             measurement_size: [plane.height, plane.width],
             lattice,
             cells: cells(&lattice, tile.size, tile.wraps),
+            black: black(&features, &tile),
         };
         model.write_directions(description)?;
         model.write_tile(&tile)?;

@@ -46,7 +46,9 @@ impl Model {
         layout: &Layout<'_>,
     ) -> Result<Array> {
         let array = self.store.open_array(name, layout).map_err(|error| match error.kind() {
-            crate::error::ErrorKind::Missing => error.hint(format!("run {} on it again", stage.commands())),
+            crate::error::ErrorKind::Missing => {
+                error.hint(format!("to make it again: {}", self.command(stage)))
+            }
             _ => error,
         })?;
         let Some(kept) = &entry.checksums else { return Ok(array) };

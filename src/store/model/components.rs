@@ -10,6 +10,8 @@
 //!
 //! Values lie on the sRGB curve, on which 255 is white; see [`crate::color::curve`].
 
+use std::collections::BTreeMap;
+
 use btfkit_packed::{LARGEST, LARGEST_OF_BASIS};
 use serde::{Deserialize, Serialize};
 
@@ -58,6 +60,9 @@ pub struct ComponentsReport {
     pub bytes: u64,
     /// Bytes of the tile's samples in the measurement.
     pub tile_bytes: u64,
+    /// What a packed file said of itself that no array holds, such as its licence, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub texts: BTreeMap<String, String>,
 }
 
 fn is_none(count: &u64) -> bool {
@@ -196,6 +201,7 @@ impl Model {
             psnr_db: None,
             bytes: 0,
             tile_bytes: 0,
+            texts: BTreeMap::new(),
         };
         Ok(self.components_shape(&report)?.bytes())
     }

@@ -78,10 +78,7 @@ impl Model {
 
     /// The entry of a stage that must be done, which must be the same whenever it is read.
     pub(super) fn done(&self, stage: Stage) -> Result<Entry> {
-        self.seen(stage)?.ok_or_else(|| {
-            Error::missing(format!("{}: stage {} has not been run", self.path().display(), stage.name()))
-                .hint(format!("run {} on it first", stage.commands()))
-        })
+        self.seen(stage)?.ok_or_else(|| self.lacks(stage))
     }
 
     /// The same of a stage that may not be done yet.
@@ -216,26 +213,38 @@ impl Model {
                 let Some(entry) = entries.remove(taken) else { continue };
                 let of_stage = self.arrays(*taken, &entry.report).unwrap_or_default();
                 arrays.extend(of_stage.into_iter().map(|(name, _)| name));
-                later.extend((*taken != stage).then(|| taken.name()));
+                later.extend((*taken != stage).then_some(*taken));
             }
             // Before anything is taken back.
             for folder in arrays.iter().map(|array| self.path().join(array)).filter(|folder| folder.is_dir())
             {
                 expect_own(&folder, |path| is_of_array(&folder, path))?;
             }
-            for name in later {
-                context.progress.notice(&format!(
-                    "{}: stage {name} built on what is made anew: run it again (btf {name}, or btf model)",
-                    self.path().display(),
-                ));
-            }
             self.write_root(attributes, entries)?;
+            self.tell_taken(&later, context);
             stage.builders().iter().chain([&stage]).for_each(|taken| self.store.forget(taken.name()));
         }
         for array in arrays {
             self.store.remove(&array)?;
         }
         Ok(())
+    }
+
+    /// Says which stages went with the one that they were built on, and what makes them again; not those that follow by
+    /// themselves.
+    fn tell_taken(&self, taken: &[Stage], context: &Context<'_>) {
+        let left = || taken.iter().filter(|stage| !(context.follows_up() && Stage::ALL.contains(stage)));
+        if left().next().is_none() {
+            return;
+        }
+        let names: Vec<&str> = left().map(|stage| stage.name()).collect();
+        let commands: Vec<String> = left().map(|&stage| self.command(stage)).collect();
+        context.progress.notice(&format!(
+            "{}: what was built on it went with it: {}; to make it again: {}",
+            self.path().display(),
+            names.join(", "),
+            commands.join(", then ")
+        ));
     }
 
     /// Whether a stage is done by this recipe, and its arrays are all there.

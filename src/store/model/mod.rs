@@ -4,6 +4,7 @@
 //! the attributes: arrays without their entry are the remains of a run that was killed. A stage has a file here with
 //! its recipe, its report, its arrays, and the checks that reading them needs.
 
+mod advice;
 pub mod appearance;
 mod arrays;
 pub mod clusters;
@@ -22,6 +23,7 @@ use crate::disk::output::expect_outside_stores;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::zarr::Store;
+pub(crate) use advice::{UNPACKED, measurement_name};
 pub(crate) use clusters::NARROW;
 pub use clusters::{Clusters, Representatives, index_bytes};
 use entries::STAGES;

@@ -49,12 +49,6 @@ impl Stage {
         }
     }
 
-    /// The commands that run it, for advice.
-    pub(super) fn commands(self) -> String {
-        let also = if Self::OPTIONAL.contains(&self) { "" } else { " (or `btf model`)" };
-        format!("`btf {}`{also}", self.name())
-    }
-
     /// The stage that it works on the result of.
     pub fn input(self) -> Option<Self> {
         match self {

@@ -70,6 +70,9 @@ pub struct TileReport {
     /// whole cells); none where the tile holds no whole number of cells.
     #[serde(default)]
     pub cells: Vec<[i32; 2]>,
+    /// Share of the tile that is black from everywhere while the rest is not; known only where it was just cut.
+    #[serde(skip)]
+    pub black: f64,
 }
 
 impl TileReport {

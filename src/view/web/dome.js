@@ -23,6 +23,9 @@ export function told([theta, phi]) {
   return `${Math.round(90 - theta)}° above the surface, from the ${SIDES[Math.round(phi / 45) % 8]}`;
 }
 
+/** The angles as the options of `btf image` and `btf render` take them. @param {Angles} angles */
+export const inDegrees = ([theta, phi]) => `(theta ${Math.round(theta)}°, phi ${(Math.round(phi) % 360 + 360) % 360}°)`;
+
 /** The widget. */
 export class Dome {
   /** @param {SVGSVGElement} svg @param {(light: Angles) => void} move @param {() => void} rest when it is let go */

@@ -239,6 +239,11 @@ class Viewer {
       return;
     }
     document.body.dataset.state = this.isMore ? "working" : "ready";
+    const isBare = renderer.isBare(this.state);
+    if (isBare !== document.body.classList.contains("bare")) {
+      document.body.classList.toggle("bare", isBare);
+      notice(isBare ? "Computing the surface…" : "", false);
+    }
     if (this.isMore) this.ask();
   }
 }

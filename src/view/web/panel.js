@@ -1,7 +1,7 @@
 // The controls beside the picture: ordinary form elements, which the state and they keep equal.
 
 import { CHOICES } from "./state.js";
-import { told } from "./dome.js";
+import { inDegrees, told } from "./dome.js";
 
 /** @typedef {import("./state.js").State} State */
 
@@ -63,7 +63,7 @@ export class Panel {
     this.range("scale", Math.log2(state.scale), `${Math.round(state.scale)} texels`);
     /** @type {HTMLElement} */ (this.element.querySelector("[data-of=scale]")).hidden = state.shape === "plane";
     /** @type {HTMLButtonElement} */ (this.element.querySelector("[data-act=another]")).hidden = state.surface !== "endless";
-    /** @type {HTMLElement} */ (this.element.querySelector("[data-light]")).textContent = `Light ${told(state.light)}`;
+    /** @type {HTMLElement} */ (this.element.querySelector("[data-light]")).textContent = `Light ${told(state.light)} ${inDegrees(state.light)}`;
   }
 
   /** @param {string} name @param {number} value @param {string} text */

@@ -85,6 +85,8 @@ export class Renderer {
     this.plane = material.header.appearance ? new Plane(material) : null;
     /** @type {Tiles | null} */
     this.tiles = null;
+    /** The seed of the endless surface of which a whole picture has been made. @type {number | null} */
+    this.ripe = null;
     this.empty = layered(gl, gl.RG16I, 1, 1, 1);
     this.pickTarget = texture(gl, gl.RGBA16F, 1, 1);
     /** @type {WebGLTexture | null} */
@@ -171,6 +173,11 @@ export class Renderer {
     return atlas.colors[level];
   }
 
+  /** Whether the tile still stands in for the endless surface. @param {State} state */
+  isBare(state) {
+    return state.surface === "endless" && !!this.plane && this.ripe !== state.seed;
+  }
+
   /** Makes a part of what the endless plane needs; whether there was something to make. */
   prepare() {
     if (!this.plane || this.tiles) return false;
@@ -247,6 +254,7 @@ export class Renderer {
     // While something moves, every other frame is kept free for it.
     if (isMoving && this.drawn % 2) return tiles.missing.length > 0;
     if (tiles.make()) see();
+    if (!tiles.missing.length) this.ripe = state.seed;
     return tiles.missing.length > 0;
   }
 

@@ -45,9 +45,7 @@ impl Model {
             || Ok::<_, Error>(self.recipe::<ComponentsRecipe>(Stage::Components)?.packed.is_some());
         self.has(Stage::Components).unwrap_or(false)
             && is_packed().unwrap_or(false)
-            && self
-                .recipe::<TileRecipe>(Stage::Tile)
-                .is_ok_and(|recipe| recipe.measurement.starts_with(UNPACKED))
+            && self.tile_recipe().is_some_and(|recipe| recipe.measurement.starts_with(UNPACKED))
     }
 
     /// The commands that make the result of a stage, with those of earlier stages that are missing too.
@@ -83,9 +81,15 @@ impl Model {
         }
     }
 
+    /// The recipe of the tile, where there is one. Where there is none, reading it would ask for advice, which begins here.
+    fn tile_recipe(&self) -> Option<TileRecipe> {
+        let has_tile = self.has(Stage::Tile).unwrap_or(false);
+        has_tile.then(|| self.recipe::<TileRecipe>(Stage::Tile).ok()).flatten()
+    }
+
     /// The measurement that it was made of where it is found, else a word for it.
     fn likely_measurement(&self) -> String {
-        let digest = self.recipe::<TileRecipe>(Stage::Tile).ok().map(|recipe| recipe.measurement);
+        let digest = self.tile_recipe().map(|recipe| recipe.measurement);
         let name = measurement_name(self.path());
         let places = origin::places(self.path(), origin::MEASUREMENT, name.to_str());
         let found = places.into_iter().find(|place| {

@@ -203,7 +203,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
     assert_eq!((report["pairs"].as_array().unwrap().len(), &report["crop"]), (1, &64.into()));
 
     for (arguments, code, part) in [
-        (&["--pair", "3,0"][..], 2, "a view below 3"),
+        (&["--pair", "3,0"][..], 2, "a view from 0 to 2"),
         (&["--pair", "3"], 2, "VIEW,LIGHT"),
         (&["--crop", "100"], 2, "multiple of 16"),
         (&["--size", "9x9"], 2, "--size is for a model"),

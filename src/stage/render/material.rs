@@ -31,16 +31,22 @@ const INDEX_BYTES: u64 = 16;
 pub(super) const SPARE_BYTES: u64 = (32 << 20) + PIECE_BYTES;
 
 /// A material.
-pub(super) struct Material {
-    pub(super) evaluator: Evaluator<Table>,
-    pub(super) texture: Texture,
+pub struct Material {
+    /// Its values under any view and light.
+    pub evaluator: Evaluator<Table>,
+    /// Which entry of the evaluator each texel is.
+    pub texture: Texture,
     /// Size of the texture and whether it repeats; none where it is endless.
-    pub(super) bounds: Option<(Size, bool)>,
-    pub(super) notes: Vec<String>,
+    pub bounds: Option<(Size, bool)>,
+    /// What a user should know of it, a sentence each.
+    pub notes: Vec<String>,
 }
 
-/// Opens what is to be shown.
-pub(super) fn open(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
+/// Opens what is to be shown; `room` is the memory that is left for it.
+///
+/// # Errors
+/// Those of opening the stores, and of memory.
+pub fn open(options: &Options, room: &mut Room, context: &Context<'_>) -> Result<Material> {
     let path = &options.source;
     if pack::is_packed(path) {
         return of_packed(options, room, context);

@@ -1,6 +1,6 @@
 //! Pictures of a material on an object, one or a sequence of them.
 
-mod material;
+pub mod material;
 mod objects;
 mod sheets;
 

@@ -103,8 +103,8 @@ impl Look {
                 options.model.clone_from(&self.model);
                 options.plane = self.plane;
                 // Of two threads that open it at once, one's is kept.
-                let _ =
-                    self.material.set(material::open(&options, &mut Room::new(context.memory()), context)?);
+                let mut room = Room::new(context.memory());
+                let _ = self.material.set(material::open(&options, &mut room, context)?);
             }
             let material = self.material.get().ok_or_else(|| Error::internal("no material"))?;
             let mut values = vec![[0.0f32; 3]; count];

@@ -42,7 +42,7 @@ pub struct Material {
     pub notes: Vec<String>,
 }
 
-/// Opens what is to be shown; `room` is the memory that is left for it.
+/// Opens what is to be shown; what stays in memory is taken of the room.
 ///
 /// # Errors
 /// Those of opening the stores, and of memory.

@@ -169,7 +169,6 @@ pub(crate) struct Packed {
     /// Digest of the measurement, where the tile is all of it.
     pub(crate) measurement: Option<String>,
     /// What else the file says: names and texts.
-    #[cfg(feature = "hdf5")]
     pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,
@@ -206,18 +205,8 @@ impl Packed {
             coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
             channels: from.channels,
         };
-        Self {
-            components,
-            description,
-            wraps: from.wraps,
-            digest,
-            measurement,
-            #[cfg(feature = "hdf5")]
-            texts: from.texts,
-            notes,
-            file_bytes,
-            memory_bytes,
-        }
+        let (wraps, texts) = (from.wraps, from.texts);
+        Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
     }
 }
 

@@ -73,14 +73,16 @@ impl Model {
             expect("a component's basis", basis.len(), self.brdf())?;
             expect("a component's coefficients", coefficients.len(), self.texels())?;
         }
-        let within =
-            |what: &str, list: &[f64], most: f64| match list.iter().find(|value| !(value.abs() <= most)) {
-                None => Ok(()),
-                Some(value) => {
-                    let expected = format!("finite numbers, of at most {most:e}");
-                    Err(Error::new(format!("the value {value:e} of {what}"), expected))
-                }
-            };
+        let within = |what: &str, list: &[f64], most: f64| match list
+            .iter()
+            .find(|value| value.is_nan() || value.abs() > most)
+        {
+            None => Ok(()),
+            Some(value) => {
+                let expected = format!("finite numbers, of at most {most:e}");
+                Err(Error::new(format!("the value {value:e} of {what}"), expected))
+            }
+        };
         for Component { basis, coefficients } in &self.components {
             within("a basis", basis, LARGEST_OF_BASIS)?;
             within("coefficients", coefficients, LARGEST)?;

@@ -202,6 +202,7 @@ impl<'a> Iterator for Statements<'a> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     fn read(text: &[u8]) -> Result<Vec<[Corner; 3]>> {

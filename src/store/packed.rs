@@ -168,6 +168,9 @@ pub(crate) struct Packed {
     pub(crate) digest: String,
     /// Digest of the measurement, where the tile is all of it.
     pub(crate) measurement: Option<String>,
+    /// What else the file says: names and texts. Of what is exported, HDF5 files keep them.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
+    pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,
     /// Bytes of the file.
@@ -203,7 +206,7 @@ impl Packed {
             coefficients: side_by_side(&list(|part| &part.coefficients), from.texels()),
             channels: from.channels,
         };
-        let wraps = from.wraps;
+        let (wraps, texts) = (from.wraps, from.texts);
         Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
     }
 }

@@ -241,7 +241,7 @@ impl Model {
         // Those of packed models: sums of products have to stay finite.
         let numbers = |name: &str, layout: &Layout<'_>, most: f64| -> Result<Vec<f32>> {
             let list = self.read::<f32>(Stage::Components, name, layout)?;
-            match list.iter().find(|value| !(f64::from(value.abs()) <= most)) {
+            match list.iter().find(|value| value.is_nan() || f64::from(value.abs()) > most) {
                 None => Ok(list),
                 Some(value) => {
                     let what = format!("got {value:e}, expected finite numbers of at most {most:e}");

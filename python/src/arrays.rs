@@ -100,9 +100,7 @@ impl Vectors {
         }
         let numbers: Vec<f64> = given.as_array().iter().copied().collect();
         let vectors = numbers.chunks_exact(columns).enumerate().map(|(row, numbers)| match *numbers {
-            [theta, phi] => {
-                direction(&format!("{name}, row {row}"), (theta, phi)).map(|direction| direction.vector())
-            }
+            [theta, phi] => direction(&format!("{name}, row {row}"), (theta, phi)).map(Direction::vector),
             [x, y, z] => unit(name, row, [x, y, z]),
             _ => Ok([0.0; 3]),
         });

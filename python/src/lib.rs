@@ -3,6 +3,9 @@
 //! Everything here hands on to the library. What takes long runs without Python's lock, tells its progress, and obeys
 //! Ctrl-C ([`work`]).
 
+// Python hands arguments over by value.
+#![allow(clippy::needless_pass_by_value)]
+
 mod arrays;
 mod errors;
 mod look;

@@ -4,12 +4,10 @@ use btfkit::error::Result;
 use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
-use btfkit::run::shard::Shard;
 use btfkit::shape::Size;
 use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::compare::{By, Subject};
 use btfkit::stage::ledger::Ledger;
-use btfkit::stage::partial::Sharing;
 use btfkit::stage::{baselines, compare, image, pack};
 use btfkit::store::model::Model;
 use btfkit::store::{self, model};
@@ -17,6 +15,7 @@ use btfkit::words::counted;
 use btfkit_formats::Direction;
 use clap::{Args, ValueEnum};
 
+use super::sharing::SharingArgs;
 use super::table::{row, table};
 use super::{Console, as_json, bytes_text};
 
@@ -58,15 +57,8 @@ pub(super) struct Compare {
     /// With --baselines, also draw the curves of error and bytes: .png, .jpg, .webp or .tif
     #[arg(long, value_name = "FILE", requires = "baselines")]
     curves: Option<PathBuf>,
-    /// Keep the sums of each view in this folder, so that many jobs share the work and a stopped one goes on
-    #[arg(long, value_name = "DIR")]
-    partial: Option<PathBuf>,
-    /// Compare only part K of N of the views, K from 0, in any order; `env` takes both from the variables of Slurm or MPI
-    #[arg(long, requires = "partial", value_name = "K/N|env", default_value = "0/1")]
-    shard: Shard,
-    /// Compare nothing, only put the sums in the folder together
-    #[arg(long, requires = "partial", conflicts_with = "shard")]
-    reduce: bool,
+    #[command(flatten)]
+    sharing: SharingArgs,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -83,7 +75,7 @@ enum ByName {
 impl Compare {
     /// Whether the same command goes on where it was stopped.
     pub(super) fn goes_on(&self) -> bool {
-        self.partial.is_some()
+        self.sharing.goes_on()
     }
 
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
@@ -109,11 +101,9 @@ impl Compare {
         let subject = compare::open(&options, context)?;
         let by = subject.values.by();
         console.notes(subject.values.notes());
-        let report = match &self.partial {
+        let report = match self.sharing.sharing() {
             None => compare::run(&subject, context)?,
-            Some(folder) => {
-                let shard = (!self.reduce).then_some(self.shard);
-                let sharing = Sharing { folder: folder.clone(), shard };
+            Some(sharing) => {
                 let shared = compare::run_shared(&subject, &sharing, context)?;
                 let Some(report) = shared.report else {
                     let views = counted(shared.views, "view");

@@ -29,10 +29,10 @@ pub(super) struct Deepzoom {
     #[arg(long, value_enum, default_value = "png")]
     format: TileFormat,
     /// Side of a tile in pixels, without its overlap
-    #[arg(long, default_value_t = 254, value_name = "PIXELS")]
+    #[arg(long, default_value_t = deepzoom::TILE_SIDE, value_name = "PIXELS")]
     tile_size: usize,
     /// Pixels by which neighbouring tiles overlap
-    #[arg(long, default_value_t = 1, value_name = "PIXELS")]
+    #[arg(long, default_value_t = deepzoom::OVERLAP, value_name = "PIXELS")]
     overlap: usize,
     /// Encode only the tiles of part K of N of the rows, K from 0, so that N jobs share the work, in any order; `env`
     /// takes both from the variables of Slurm or MPI

@@ -168,20 +168,39 @@ impl Enlarge {
 
     fn by(&self) -> By {
         let (keep_source, keep_normals) = (!self.no_source, self.keep_normals);
-        let pieces = |pieces| By::Patches(patches::Options { pieces, keep_source, keep_normals });
-        match self.method {
-            Method::Paper => By::Paper(paper::Options {
+        match self.method.usual() {
+            By::Paper(_) => By::Paper(paper::Options {
                 candidates: self.candidates,
                 keep_normals,
                 band_rows: self.band.map(|rows| rows as usize),
             }),
-            Method::Coherent => {
+            By::Coherent(_) => {
                 By::Coherent(coherent::Options { jitter: self.jitter, keep_source, keep_normals })
             }
-            Method::Repeat => pieces(Pieces::Repeat),
-            Method::Tiles => pieces(Pieces::Tiles(self.tiles.unwrap_or(TILES))),
-            Method::Roller => pieces(Pieces::Roller),
-            Method::Quilt => By::Quilt(quilt::Options { keep_source, keep_normals }),
+            By::Patches(patches::Options { pieces, .. }) => {
+                let pieces = match (pieces, self.tiles) {
+                    (Pieces::Tiles(_), Some(count)) => Pieces::Tiles(count),
+                    (usual, _) => usual,
+                };
+                By::Patches(patches::Options { pieces, keep_source, keep_normals })
+            }
+            By::Quilt(_) => By::Quilt(quilt::Options { keep_source, keep_normals }),
+        }
+    }
+}
+
+impl Method {
+    /// The method, with the options that it has unless they are given.
+    pub(super) fn usual(self) -> By {
+        let (keep_source, keep_normals) = (true, false);
+        let pieces = |pieces| By::Patches(patches::Options { pieces, keep_source, keep_normals });
+        match self {
+            Self::Paper => By::Paper(paper::Options { candidates: None, keep_normals, band_rows: None }),
+            Self::Coherent => By::Coherent(coherent::Options { jitter: None, keep_source, keep_normals }),
+            Self::Repeat => pieces(Pieces::Repeat),
+            Self::Tiles => pieces(Pieces::Tiles(TILES)),
+            Self::Roller => pieces(Pieces::Roller),
+            Self::Quilt => By::Quilt(quilt::Options { keep_source, keep_normals }),
         }
     }
 }

@@ -5,13 +5,14 @@ use btfkit::likeness::Measure;
 use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
-use btfkit::stage::judge::{self, Normals, Origin, Report, Row};
+use btfkit::stage::judge::{self, Judged, Normals, Origin, Report, Row};
 use btfkit::store::{enlarged, measurement, model};
 use btfkit::text::escaped;
 use btfkit::words::counted;
 use clap::Args;
 
 use super::given::expect_in_order;
+use super::sharing::SharingArgs;
 use super::table::{row, table};
 use super::{Console, as_json};
 
@@ -24,6 +25,9 @@ Examples:
   btf judge wood-4k.zarr --against wood.zarr --json > judged.json
   btf judge wood.model.zarr --size 2048x2048 --against wood.zarr     a part of the endless surface of a model
   btf judge wood-4k.zarr --against wood.zarr --pair 0,1 --pair 30,10 view 0 under light 1, view 30 under light 10
+Share the work between processes; the figures are those of one:
+  btf judge wood-4k.zarr --against wood.zarr --partial parts --shard 0/4     ... 3/4, in any order
+  btf judge wood-4k.zarr --against wood.zarr --partial parts --reduce        exit code 66 if a part is missing
 J is the largest of five measures of the difference from real crops. At 1, the enlargement differs from them as much as
 they differ from each other. docs/how-to/judge.md explains the measures.")]
 pub(super) struct Judge {
@@ -49,12 +53,19 @@ pub(super) struct Judge {
     /// Also write the pictures that were judged, side by side: .png, .jpg, .webp or .tif
     #[arg(long, alias = "sheet", value_name = "FILE")]
     picture: Option<PathBuf>,
+    #[command(flatten)]
+    sharing: SharingArgs,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }
 
 impl Judge {
+    /// Whether the same command goes on where it was stopped.
+    pub(super) fn goes_on(&self) -> bool {
+        self.sharing.goes_on()
+    }
+
     pub(super) fn run(&self, context: &Context<'_>, console: Console) -> Result<()> {
         expect_in_order(
             [(&self.subject, &[model::KIND, enlarged::KIND]), (&self.against, &[measurement::KIND])],
@@ -63,23 +74,33 @@ impl Judge {
         if let Some(path) = &self.picture {
             Ending::of(path, &Ending::DISPLAY)?;
         }
-        let (report, sheet) = judge::run(
-            &judge::Options {
-                subject: self.subject.clone(),
-                measurement: self.against.clone(),
-                model: self.model.clone(),
-                size: self.size,
-                pairs: self.pair.clone(),
-                crop: self.crop,
-            },
-            context,
-        )?;
+        let options = judge::Options {
+            subject: self.subject.clone(),
+            measurement: self.against.clone(),
+            model: self.model.clone(),
+            size: self.size,
+            pairs: self.pair.clone(),
+            crop: self.crop,
+            sheet: self.picture.is_some(),
+        };
+        let Judged { report, sheet } = match self.sharing.sharing() {
+            None => judge::run(&options, context)?,
+            Some(sharing) => {
+                let shared = judge::run_shared(&options, &sharing, context)?;
+                let Some(judged) = shared.judged else {
+                    let parts = counted(shared.parts, "part");
+                    console.line(format!("{}: {} of {parts} judged", shared.folder.display(), shared.done));
+                    return Ok(());
+                };
+                judged
+            }
+        };
         if self.json {
             console.plan(&as_json(&report)?)?;
         } else {
             console.text(&text_of(&report));
         }
-        if let Some(path) = &self.picture {
+        if let (Some(path), Some(sheet)) = (&self.picture, sheet) {
             sheet.write(path, context.existing)?;
         }
         Ok(())

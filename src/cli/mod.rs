@@ -19,6 +19,7 @@ mod image;
 mod import;
 mod info;
 mod judge;
+mod location;
 mod model;
 mod normals;
 mod number;
@@ -28,6 +29,7 @@ mod progress;
 mod render;
 mod sample;
 mod scene;
+mod sharing;
 mod slurm;
 mod source;
 mod status;
@@ -157,7 +159,14 @@ pub(crate) fn run() -> ExitCode {
         Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
         return ExitCode::from(exit_code(error.kind()));
     }
-    let matches = help::command().try_get_matches();
+    let arguments = match location::arguments(std::env::args_os()) {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
+            return ExitCode::from(exit_code(error.kind()));
+        }
+    };
+    let matches = help::command().try_get_matches_from(arguments);
     let cli = matches.and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, Given::of(&matches))));
     let (cli, given) = cli.unwrap_or_else(|error| help::explained(error).exit());
     let threads = cli.common.threads.map_or_else(
@@ -322,6 +331,7 @@ impl Command {
             Self::Import(_) | Self::Model(_) | Self::Cluster(_) | Self::Enlarge(_) | Self::Demo(_) => true,
             Self::Export(command) => command.goes_on(),
             Self::Compare(command) => command.goes_on(),
+            Self::Judge(command) => command.goes_on(),
             _ => false,
         }
     }

@@ -36,8 +36,8 @@ pub(super) struct Slurm {
     /// Make all stores in this folder [default: measurements in the current folder, the rest beside them]
     #[arg(long, value_name = "DIR")]
     into: Option<PathBuf>,
-    /// Number of parts that the import and the enlargement of each material are divided into, a job each [default: 8,
-    /// or 1 for several materials]
+    /// Most parts that the import, the enlargement and the pyramid of each material are divided into, a job each; small
+    /// ones are divided into fewer [default: 8, or 1 for several materials]
     #[arg(long, value_name = "N", value_parser = number::count)]
     parts: Option<usize>,
     /// Number of parts that each pass of the clustering is divided into, a job each, for planes that do not fit in
@@ -131,7 +131,7 @@ impl Slurm {
         let surface = self.size.map(|size| Surface {
             size,
             method: method.as_ref().map_or("coherent", |method| method.get_name()).to_owned(),
-            in_parts: !matches!(self.method, Method::Paper | Method::Quilt),
+            by: self.method.usual(),
         });
         let usual = if self.inputs.len() == 1 { PARTS } else { 1 };
         let parts = self.parts.unwrap_or(usual);

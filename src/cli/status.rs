@@ -17,9 +17,10 @@ Only the disk is looked at, and no sample is read: btf verify looks for damage.
 Examples:
   btf status wood.zarr
   btf status stores/*.zarr --json       one object per line
+  btf status wood-4k.dzi                a Deep Zoom pyramid
 The exit code is 0 if everything is there, and 66 if something is missing.")]
 pub(super) struct StatusOf {
-    /// Measurements, models and enlargements; each gets one line
+    /// Measurements, models, enlargements and Deep Zoom pyramids (.dzi); each gets one line
     #[arg(required = true, value_name = "STORE")]
     stores: Vec<PathBuf>,
     /// Print the result as JSON
@@ -83,10 +84,11 @@ enum Format {
 Examples:
   btf missing wood.zarr --shards 100                              such as 3,7-9; nothing if all is there
   sbatch --array=$(btf missing wood.zarr --shards 100) import.sh  these parts again, each with --shard K/100
+  btf missing wood-4k.dzi --shards 8                              of a pyramid that btf export makes in parts
   btf missing wood.zarr --shards 100 --format lines | parallel btf import wood.zip wood.zarr --shard {}/100
 The exit code is 0 also if something is missing; btf status says 66 then.")]
 pub(super) struct Missing {
-    /// A measurement or an enlargement
+    /// A measurement, an enlargement or a Deep Zoom pyramid (.dzi)
     store: PathBuf,
     /// Number of shards that the work was divided into, N of --shard K/N
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

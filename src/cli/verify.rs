@@ -41,8 +41,8 @@ pub(super) struct Verify {
     /// Compare with the archive that the measurement was made of; repeat the option for each piece
     #[arg(long = "source", value_name = "ARCHIVE")]
     archive: Vec<PathBuf>,
-    /// Look only at part K of N of the views of a measurement, or of the rows of shards of an enlargement, K from 0, so
-    /// that N jobs share the work; `env` takes both from the variables of Slurm or MPI
+    /// Look only at part K of N of the views of a measurement, or of the rows of shards of an enlargement or of tiles of a
+    /// pyramid, K from 0, so that N jobs share the work; `env` takes both from the variables of Slurm or MPI
     #[arg(long, value_name = "K/N|env", default_value = "0/1")]
     shard: Shard,
     /// Print the result as JSON

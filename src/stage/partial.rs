@@ -71,9 +71,12 @@ impl Partial {
     /// Keeps the result of a unit.
     ///
     /// # Errors
-    /// Those of writing.
-    pub(crate) fn write<T: Serialize>(&self, unit: usize, value: &T) -> Result<()> {
+    /// Those of writing; and [`crate::ErrorKind::Internal`] for a result that could not be read back, such as one that is
+    /// no number: it would be missing for ever.
+    pub(crate) fn write<T: Serialize + DeserializeOwned>(&self, unit: usize, value: &T) -> Result<()> {
         let value = serde_json::to_value(value).map_err(|error| Error::internal(error.to_string()))?;
+        serde_json::from_value::<T>(value.clone())
+            .map_err(|error| Error::internal(format!("result of unit {unit}: {error}")))?;
         let document = json!({"digest": self.seal(unit, &value), "value": value});
         let path = self.path(unit);
         Temporary::sweep_beside(&path);
@@ -100,6 +103,7 @@ mod tests {
         assert_eq!(partial.read::<Vec<f64>>(3), Some(values.clone()));
         assert_eq!(partial.read::<Vec<f64>>(2), None);
         // Another work has its own.
+        assert!(partial.write(5, &vec![f64::NAN]).is_err());
         let other = Partial::at(folder.path(), &json!({"a": 2})).unwrap();
         assert_eq!(other.read::<Vec<f64>>(3), None);
         std::fs::copy(partial.path(3), partial.path(4)).unwrap();

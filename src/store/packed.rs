@@ -168,8 +168,7 @@ pub(crate) struct Packed {
     pub(crate) digest: String,
     /// Digest of the measurement, where the tile is all of it.
     pub(crate) measurement: Option<String>,
-    /// What else the file says: names and texts. Of what is exported, HDF5 files keep them.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
+    /// What else the file says: names and texts.
     pub(crate) texts: Vec<(String, String)>,
     /// What is wrong with its end.
     pub(crate) notes: Vec<String>,

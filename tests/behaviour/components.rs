@@ -271,7 +271,8 @@ fn whoever_opens_a_packed_file_gives_the_same_answer() {
     let bytes = std::fs::read(at("m.btfc")).unwrap();
     let red = bytes.windows(6).position(|six| six == b"\x01R\x01G\x01B").unwrap();
     let forged = at("forged.btfc");
-    let header: [(&str, Box<dyn Fn(&mut [u8])>); 3] = [
+    type Change = Box<dyn Fn(&mut [u8])>;
+    let header: [(&str, Change); 3] = [
         ("a step of 3", Box::new(|head: &mut [u8]| head[14..18].copy_from_slice(&f32::MAX.to_le_bytes()))),
         ("channel", Box::new(move |head: &mut [u8]| head[red + 1] = b'Q')),
         ("1 to 256 channels", Box::new(|head: &mut [u8]| head[12..14].fill(255))),

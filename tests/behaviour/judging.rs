@@ -203,7 +203,7 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
     assert_eq!((report["pairs"].as_array().unwrap().len(), &report["crop"]), (1, &64.into()));
 
     for (arguments, code, part) in [
-        (&["--pair", "3,0"][..], 2, "a view below 3"),
+        (&["--pair", "3,0"][..], 2, "a view from 0 to 2"),
         (&["--pair", "3"], 2, "VIEW,LIGHT"),
         (&["--crop", "100"], 2, "multiple of 16"),
         (&["--size", "9x9"], 2, "--size is for a model"),
@@ -219,6 +219,60 @@ fn an_enlargement_is_judged_three_times_alike_on_any_number_of_threads() {
     let mut other = btf();
     other.arg("judge").arg(leather.at("big.zarr")).arg("--against").arg(fixture().measurement());
     assert!(fail(&mut other, 65).contains("another measurement"));
+}
+
+/// Runs parts of a judging in this order, each of so many, then puts them together: figures and picture are those of one.
+fn shared_as_one(judge: impl Fn() -> Command, folder: &Path, shards: &[&str], parts: usize) {
+    let told = |more: &[&str], picture: &str| {
+        let picture = folder.join(picture);
+        let told = succeed(judge().arg("--json").arg("--picture").arg(&picture).args(more));
+        (told, std::fs::read(picture).ok())
+    };
+    let expected = told(&[], "one.png");
+    let kept = folder.join("parts");
+    let partial = ["--partial", kept.to_str().unwrap()];
+    let reduce = [&partial[..], &["--reduce"]].concat();
+    assert!(fail(judge().args(&reduce), 66).contains(&format!("0 of {parts} parts judged")));
+    let (last, before) = shards.split_last().unwrap();
+    for shard in before {
+        let (told, picture) = told(&[&partial[..], &["--shard", shard]].concat(), "part.png");
+        assert!(told.contains(&format!("of {parts} parts judged")) && picture.is_none(), "{told}");
+        assert!(fail(judge().args(&reduce), 66).contains("--shard K/N"));
+    }
+    // Whoever comes last tells the figures.
+    assert!(told(&[&partial[..], &["--shard", last, "--threads", "1"]].concat(), "last.png") == expected);
+    assert!(told(&reduce, "reduced.png") == expected);
+    // A damaged part counts as missing, and is made again.
+    let files = crate::fixture::tree_names(&kept);
+    assert_eq!(files.len(), parts);
+    let bytes = std::fs::read(&files[1]).unwrap();
+    std::fs::write(&files[1], &bytes[..bytes.len() / 2]).unwrap();
+    assert!(fail(judge().args(&reduce), 66).contains(&format!("{} of {parts} parts", parts - 1)));
+    assert!(told(&partial, "again.png") == expected);
+    assert!(std::fs::read(&files[1]).unwrap() == bytes);
+    std::fs::remove_dir_all(kept).unwrap();
+}
+
+#[test]
+fn parts_of_a_judging_by_any_number_of_jobs_give_the_figures_of_one() {
+    let leather = Leather::new();
+    let one = tempfile::tempdir().unwrap();
+    shared_as_one(|| leather.judge("big.zarr"), one.path(), &["2/3", "0/3", "2/3", "1/3"], 7);
+    let other = tempfile::tempdir().unwrap();
+    let plane = || {
+        let mut command = leather.judge("a.model.zarr");
+        command.args(["--size", "288x256", "--pair", "0,1", "--crop", "64"]);
+        command
+    };
+    shared_as_one(plane, other.path(), &["5/7", "0/2", "4/7", "1/2"], 3);
+    // What is judged otherwise shares nothing.
+    let kept = other.path().join("parts");
+    succeed(plane().arg("--partial").arg(&kept));
+    for more in [&["--pair", "0,0"][..], &["--pair", "0,1", "--crop", "48"]] {
+        let mut command = leather.judge("a.model.zarr");
+        command.args(["--size", "288x256"]).args(more).arg("--partial").arg(&kept).arg("--reduce");
+        assert!(fail(&mut command, 66).contains("0 of 3 parts"), "{more:?}");
+    }
 }
 
 #[test]
@@ -282,6 +336,14 @@ fn where_an_enlargement_of_a_regular_material_begins_does_not_matter() {
         found.push(["own", "alone"].map(|row| report["mean"][row]["j"].as_f64().unwrap()));
         println!("{size}: {:?}", found.last());
     }
+    // Whoever judges a part moves the crops to the same places.
+    let judge = || {
+        let mut command = btf();
+        command.arg("judge").arg(&model).arg("--against").arg(&store).args(["--size", "305x331"]);
+        command.args(["--pair", "0,0", "--pair", "0,1"]);
+        command
+    };
+    shared_as_one(judge, folder.path(), &["2/4", "0/2", "3/4", "1/4"], 4);
     for [own, alone] in &found {
         assert!((own - found[0][0]).abs() < 0.05 && (alone - found[0][1]).abs() < 0.2, "{found:?}");
         assert!(*own < 1.3 && *alone < 2.3, "{found:?}");

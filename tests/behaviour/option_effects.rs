@@ -330,6 +330,9 @@ pub(crate) const OUTPUTS: &[Outputs] = &[
             ("crop", OF_LARGER),
             ("json", OF_LARGER),
             ("picture", OF_LARGER),
+            ("partial", OF_LARGER),
+            ("shard", OF_LARGER),
+            ("reduce", OF_LARGER),
         ],
     },
 ];
@@ -363,6 +366,8 @@ pub(crate) const IDLE: &[(&[&str], &str)] = &[
     (&["judge", "{model}", "--against", "{measurement}", "--size", "64x64", "--model", "{model}"], "--model"),
     (&["compare", "{model}", "{measurement}", "--shard", "0/2"], "--partial"),
     (&["compare", "{model}", "{measurement}", "--reduce"], "--partial"),
+    (&["judge", "{enlarged}", "--against", "{measurement}", "--shard", "0/2"], "--partial"),
+    (&["judge", "{enlarged}", "--against", "{measurement}", "--reduce"], "--partial"),
     (&["slurm", "{archive}", "--out", "{new}/jobs", "--deepzoom"], "--size"),
     (&["slurm", "{archive}", "--out", "{new}/jobs", "--method", "tiles"], "--size"),
     (&["export", "{measurement}", "{new}/e.npy", "--shard", "0/2"], "--shard"),

@@ -250,3 +250,29 @@ fn of_a_measurement_that_changed_it_is_said_which_and_what_to_run() {
     succeed(model_of(&measurement, &model).arg("--force"));
     succeed(&mut image);
 }
+
+#[test]
+fn urls_of_files_are_paths_and_nothing_is_made_for_those_of_other_places() {
+    let folder = tempfile::tempdir().unwrap();
+    let url = |path: &Path| format!("file://{}", path.display().to_string().replace('%', "%25"));
+    let made = folder.path().join("a b.zarr");
+    let named = url(&made).replace(' ', "%20");
+    succeed(btf().arg("import").args([url(&fixture().archive()), named.clone()]));
+    assert!(tree(&made) == tree(&fixture().measurement()));
+    assert!(succeed(btf().args(["status", &named])).contains("9 of 9 views"));
+    for words in [
+        &["import", "{archive}", "s3://bucket/a.zarr"][..],
+        &["info", "https://example.org/a.zarr"],
+        &["model", "s3://bucket/a.zarr", "a.model.zarr"],
+        &["slurm", "{archive}", "--into=gs://bucket"],
+    ] {
+        let mut command = btf();
+        command.current_dir(folder.path());
+        words.iter().for_each(|word| match *word {
+            "{archive}" => drop(command.arg(fixture().archive())),
+            word => drop(command.arg(word)),
+        });
+        assert!(fail(&mut command, 2).contains("got a URL, expected a file or a folder"), "{words:?}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}

@@ -86,16 +86,19 @@ fn zip(path: &Path, entries: usize, bytes: usize) {
     file.write_all(&end).unwrap();
 }
 
-/// A numpy array of 2 views under 32 lights, 8 bits: 64 MiB.
-fn npy(path: &Path) {
+/// A numpy array of so many views and lights of a square plane, 8 bits; each image is made of their numbers.
+fn npy(path: &Path, [views, lights, side]: [usize; 3], image: impl Fn(usize, usize) -> Vec<u8>) {
     let mut file = std::fs::File::create(path).unwrap();
-    file.write_all(&header([2, 32, 1024, 1024, 1], SampleType::U8)).unwrap();
-    (0..64).for_each(|image| file.write_all(&vec![image; MIB as usize]).unwrap());
-    for (name, count) in [("a.views.npy", 2), ("a.lights.npy", 32)] {
+    let shape = [views, lights, side, side, 1].map(|count| count as u64);
+    file.write_all(&header(shape, SampleType::U8)).unwrap();
+    for view in 0..views {
+        (0..lights).for_each(|light| file.write_all(&image(view, light)).unwrap());
+    }
+    for (name, count) in [("views.npy", views), ("lights.npy", lights)] {
         let direction =
             |n: usize| Direction::from_degrees(75.0 * n as f64 / count as f64, 30.0 * n as f64 % 360.0);
         let list: Vec<Direction> = (0..count).map(direction).collect();
-        std::fs::write(path.with_file_name(name), directions_file(&list)).unwrap();
+        std::fs::write(path.with_extension(name), directions_file(&list)).unwrap();
     }
 }
 
@@ -104,7 +107,8 @@ fn pages_of_an_archive_that_have_been_passed_are_given_back() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| -> PathBuf { folder.path().join(name) };
     zip(&place("a.zip"), 64, MIB as usize);
-    npy(&place("a.npy"));
+    // 64 MiB.
+    npy(&place("a.npy"), [2, 32, 1024], |view, light| vec![(32 * view + light) as u8; MIB as usize]);
     // Listed, then refused, since there is no picture in it.
     let listed = peak(btf().arg("info").arg(place("a.zip")), folder.path());
     assert_eq!(listed.code, Some(65));
@@ -121,5 +125,36 @@ fn pages_of_an_archive_that_have_been_passed_are_given_back() {
         assert!(found.mapped <= 24 * MIB, "{command:?}: {} MiB mapped", found.mapped / MIB);
         let sum = (found.own + found.mapped) / MIB;
         assert!(sum <= allowed, "{command:?}: {sum} MiB");
+    }
+}
+
+/// More codes than memory holds: whatever is kept from pass to pass, of blocks and of bounds, and whatever the threads.
+#[test]
+fn a_clustering_stays_within_its_memory() {
+    const SIDE: usize = 448;
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| -> PathBuf { folder.path().join(name) };
+    // 55 MiB of codes.
+    npy(&place("a.npy"), [17, 17, SIDE], |view, light| {
+        let grey = |at: usize| {
+            let (y, x) = (at / SIDE, at % SIDE);
+            ((y / 7 * 37 + x / 9 * 91) % 160 + (3 * view + 2 * light + y + x) % 64) as u8
+        };
+        (0..SIDE * SIDE).map(grey).collect()
+    });
+    crate::fixture::succeed(btf().arg("import").args([place("a.npy"), place("a.zarr")]));
+    for (allowed, threads) in [(84, 1), (84, 4), (100, 4)] {
+        let model = place(&format!("{allowed}-{threads}.zarr"));
+        crate::fixture::succeed(btf().arg("tile").args([&place("a.zarr"), &model]).args(["--tile", "none"]));
+        let mut command = btf();
+        command.arg("cluster").args([&place("a.zarr"), &model]);
+        command.args(["--clusters", "32", "--sample", "1000", "--passes", "3", "--tolerance", "0"]);
+        command.args(["--threads", &threads.to_string(), "--memory", &format!("{allowed}MiB")]);
+        let found = peak(&mut command, folder.path());
+        let sum = (found.own + found.mapped) / MIB;
+        println!("{allowed} MiB, {threads} threads: {sum} MiB");
+        assert_eq!(found.code, Some(0));
+        // Room to spare for what an observer counts too: the program's code.
+        assert!(sum + 8 <= allowed, "{threads} threads: {sum} of {allowed} MiB");
     }
 }

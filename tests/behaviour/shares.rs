@@ -171,6 +171,15 @@ fn parts_of_a_pyramid_in_any_order_and_twice_are_the_tiles_of_one() {
             let told = succeed(&mut export(name, shard));
             assert!(told.contains("tiles of other parts are missing"), "{name} {shard}: {told}");
             assert!(!folder.path().join(name).exists(), "{name} {shard}");
+            // By its description, which is not there yet, and by the folder of its tiles.
+            for named in [name.to_owned(), name.replace(".dzi", "_files")] {
+                let named = folder.path().join(named);
+                assert!(fail(btf().arg("status").arg(&named), 66).contains("deepzoom, "));
+                let (part, parts) = shard.split_once('/').unwrap();
+                let left = missing(&named, parts, "lines");
+                let mine = left.lines().any(|line| line == part);
+                assert!(!left.is_empty() && !mine, "{name} {shard}: {left}");
+            }
         }
         let told = succeed(&mut export(name, last));
         assert!(told.contains("a viewer of it"), "{name}: {told}");
@@ -178,7 +187,33 @@ fn parts_of_a_pyramid_in_any_order_and_twice_are_the_tiles_of_one() {
         let description = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
         assert_eq!(description(name), description("whole.dzi"));
         succeed(btf().arg("verify").arg(folder.path().join(name)));
+        assert!(succeed(btf().arg("status").arg(folder.path().join(name))).contains("deepzoom, "));
+        assert_eq!(missing(&folder.path().join(name), "3", "array"), "");
     }
+    // Parts of a verification find together what one finds.
+    let tile = whole.join("7/0_1.png");
+    let bytes = std::fs::read(&tile).unwrap();
+    std::fs::write(&tile, &bytes[..bytes.len() / 2]).unwrap();
+    let verify = |shard: &str| {
+        let mut command = btf();
+        command.arg("verify").arg(folder.path().join("whole.dzi")).args(["--shard", shard]);
+        command
+    };
+    fail(&mut verify("0/1"), 65);
+    fail(&mut verify("1/2"), 65);
+    assert!(succeed(&mut verify("0/2")).contains("note: part 0 of 2"));
+    std::fs::write(&tile, bytes).unwrap();
+    // Files that are called almost as tiles are count for nothing; a pyramid without its page lacks its end.
+    let folder_of = |name: &str| folder.path().join(name);
+    std::fs::rename(&tile, whole.join("7/0_01.png")).unwrap();
+    assert_eq!(missing(&folder_of("whole.dzi"), "2", "array"), "1\n");
+    std::fs::rename(whole.join("7/0_01.png"), &tile).unwrap();
+    std::fs::remove_file(folder_of("whole.html")).unwrap();
+    assert!(fail(btf().arg("status").arg(folder_of("whole.dzi")), 66).contains("not declared finished"));
+    assert_eq!(missing(&folder_of("whole.dzi"), "2", "array"), "0\n");
+    succeed(&mut export("whole.dzi", "0/2"));
+    assert_eq!(missing(&folder_of("whole.dzi"), "2", "array"), "");
+    fail(btf().arg("status").arg(folder_of("none.dzi")), 66);
 }
 
 #[test]

@@ -122,7 +122,17 @@ fn jobs_for_a_material_with_an_awkward_name_make_what_one_process_makes() {
     assert_eq!(asked.matches("--dependency=afterok:").count(), all.len() - 1);
     assert_eq!(asked.matches("--kill-on-invalid-dep=yes").count(), all.len() - 1);
     assert_eq!(asked.matches("--account=lab --comment=it's a\n").count(), all.len());
-    assert_eq!(asked.matches("--array=0-2 ").count(), 3, "{asked}");
+    // Import and pyramid in parts; the enlargement is one block.
+    assert_eq!(asked.matches("--array=0-2 ").count(), 2, "{asked}");
+    assert!(asked.contains("--array=0-0 enlarge.sh"), "{asked}");
+    // A pyramid that is not whole is told too, and its part is named.
+    let tile = store("_files").join("10/2_1.png");
+    assert!(tile.is_file());
+    std::fs::remove_file(&tile).unwrap();
+    let told = fail(&mut Command::new(jobs.join("status.sh")), 66);
+    assert!(told.contains("deepzoom, 21 of 22 tiles"), "{told}");
+    let left = succeed(btf().arg("missing").arg(store(".dzi")).args(["--shards", "3"]));
+    assert_eq!(left, "1\n");
     // Once more, everything is found done.
     succeed(stubs.with(Command::new("bash")).arg("submit.sh").current_dir(&jobs));
     assert_eq!(stubs.read(".codes"), "");
@@ -265,7 +275,7 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
     let stubs = Stubs::new();
     stubs.program("sbatch", "echo 'no such partition' >&2; exit 1");
     let told = fail(&mut stubs.with(slurm(&[&archive], &jobs, &["--submit"])), 74);
-    assert!(told.contains("no such partition") && told.contains("not all were submitted"), "{told}");
+    assert!(told.contains("no such partition") && told.contains("nothing was submitted"), "{told}");
 }
 
 #[test]
@@ -289,4 +299,107 @@ fn slurm_is_asked_for_what_the_plans_say_and_for_room() {
     let mut command = btf();
     command.arg("model").args([fixture().measurement(), made]).args(["--clusters", "24"]);
     succeed(command.args(["--threads", "4", "--memory", &format!("{model}MiB")]));
+}
+
+/// The tasks of each script of a folder of jobs, as they are submitted.
+fn tasks(stubs: &Stubs, jobs: &Path) -> Vec<String> {
+    stubs.program(
+        "sbatch",
+        r#"for word in "$@"; do case $word in --array=*) array=$word ;; esac; script=$word; done; echo "$array $script" >>"$LOG"; echo 7"#,
+    );
+    succeed(&mut stubs.with(Command::new(jobs.join("submit.sh"))));
+    stubs.read("").lines().map(|line| line.trim_start_matches("--array=").to_owned()).collect()
+}
+
+#[test]
+fn no_part_is_without_work_and_a_list_has_no_parts_to_edit() {
+    let folder = tempfile::tempdir().unwrap();
+    let [jobs, list] = ["jobs", "list"].map(|name| folder.path().join(name));
+    // Nine views; one block; two rows of tiles.
+    let more = ["--size", "900x400", "--deepzoom", "--parts", "40"];
+    succeed(&mut slurm(&[&fixture().archive()], &jobs, &more));
+    assert_eq!(
+        tasks(&Stubs::new(), &jobs),
+        ["0-8 import.sh", "0-0 model.sh", "0-0 enlarge.sh", "0-1 deepzoom.sh"]
+    );
+    let other = folder.path().join("other.zip");
+    std::fs::copy(fixture().archive(), &other).unwrap();
+    succeed(&mut slurm(&[&fixture().archive(), &other], &list, &["--size", "900x400", "--deepzoom"]));
+    let texts = ["settings.sh", "import.sh", "enlarge.sh", "deepzoom.sh"]
+        .map(|name| std::fs::read_to_string(list.join(name)).unwrap());
+    for text in texts {
+        assert!(!text.contains("_parts") && !text.contains("--shard"), "{text}");
+    }
+    assert!(tasks(&Stubs::new(), &list).iter().all(|task| task.starts_with("0-1 ")));
+}
+
+#[test]
+fn memory_for_surfaces_grows_with_what_their_methods_hold() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = |name: &str, size: &str, method: &str| {
+        let jobs = folder.path().join(name);
+        let more = ["--memory", "16MiB", "--size", size, "--method", method, "--deepzoom"];
+        succeed(&mut slurm(&[&fixture().archive()], &jobs, &more));
+        ["enlarge.sh", "deepzoom.sh"].map(|script| {
+            let text = std::fs::read_to_string(jobs.join(script)).unwrap();
+            let (_, after) = text.split_once("\nmemory=").unwrap();
+            after.split_once("MiB").unwrap().0.parse::<u64>().unwrap()
+        })
+    };
+    // What is asked for is enough for the commands, and not far from what they take at least.
+    for (name, method) in ["coherent", "paper", "repeat", "tiles", "roller", "quilt"].map(|name| (name, name))
+    {
+        let [enlarge, pyramid] = asked(name, "3000x700", method);
+        let plane = folder.path().join(format!("{name}.zarr"));
+        let with = |command: &mut Command, mib: u64| {
+            command.args(["--threads", "4", "--memory", &format!("{mib}MiB")]).output().unwrap().status.code()
+        };
+        let enlarged = |mib: u64| {
+            let mut command = btf();
+            command.arg("enlarge").args([&fixture().model(), &plane]).args(["--size", "3000x700"]);
+            with(command.args(["--method", method]), mib)
+        };
+        assert_eq!(enlarged(enlarge), Some(0), "{method} {enlarge}");
+        let _ = std::fs::remove_dir_all(&plane);
+        assert_eq!(enlarged(enlarge / 3), Some(2), "{method} {enlarge}");
+        assert_eq!(enlarged(enlarge), Some(0), "{method} {enlarge}");
+        let picture = |mib: u64| {
+            let mut command = btf();
+            let output = folder.path().join(format!("{name}.dzi"));
+            with(command.arg("export").args([&plane, &output]).arg("--model").arg(fixture().model()), mib)
+        };
+        assert_eq!(picture(pyramid / 3), Some(2), "{method} {pyramid}");
+        assert_eq!(picture(pyramid), Some(0), "{method} {pyramid}");
+    }
+    // A plane far wider than high: rows of it are held by some, the plane by none.
+    let wide = |method: &str| asked(&format!("wide {method}"), "1000000x100000", method);
+    let [coherent, pyramid] = wide("coherent");
+    assert!(coherent < 64, "{coherent}");
+    assert!((1000..3000).contains(&pyramid), "{pyramid}");
+    let [quilt, _] = wide("quilt");
+    assert!((2000..6000).contains(&quilt), "{quilt}");
+}
+
+#[test]
+fn what_was_submitted_before_stays_known_and_nothing_is_cancelled_that_was_not_submitted() {
+    let folder = tempfile::tempdir().unwrap();
+    let jobs = folder.path().join("jobs");
+    succeed(&mut slurm(&[&fixture().archive()], &jobs, &[]));
+    let stubs = Stubs::new();
+    let submit = || stubs.with(Command::new(jobs.join("submit.sh")));
+    stubs.program("sbatch", r#"echo "$RANDOM$RANDOM""#);
+    succeed(&mut submit());
+    let first = std::fs::read_to_string(jobs.join("jobs")).unwrap();
+    let told = succeed(&mut submit());
+    let both = std::fs::read_to_string(jobs.join("jobs")).unwrap();
+    assert!(both.starts_with(&first) && both.lines().count() == 4, "{both}");
+    assert!(told.contains("scancel --quiet $(cat"), "{told}");
+    stubs.program("sbatch", "echo refused >&2; exit 1");
+    let told = fail(&mut submit(), 1);
+    assert!(told.contains("nothing was submitted") && !told.contains("scancel"), "{told}");
+    assert_eq!(std::fs::read_to_string(jobs.join("jobs")).unwrap(), both);
+    // The second one is refused.
+    stubs.program("sbatch", r#"case "$*" in *import.sh) echo 5 ;; *) exit 1 ;; esac"#);
+    let told = fail(&mut submit(), 1);
+    assert!(told.contains("not all were submitted") && told.contains("scancel --quiet"), "{told}");
 }

@@ -65,7 +65,12 @@ impl Exemplar {
 
     /// Bytes that it takes in memory.
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&self.index[..]) + size_of_val(&self.distance[..])) as u64
+        Self::bytes_of(self.size, self.clusters)
+    }
+
+    /// The same of a tile of this size with so many clusters.
+    pub fn bytes_of(tile: Size, clusters: usize) -> u64 {
+        (tile.texels() * size_of::<u16>() + clusters * clusters * size_of::<u32>()) as u64
     }
 
     /// How far two texels differ.

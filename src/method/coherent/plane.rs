@@ -1,6 +1,8 @@
 //! The endless plane: any window of it, alone.
 
-use super::appearance::{Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, default_jitter, dims_of, sides_at};
+use super::appearance::{
+    Appearance, COARSE_DIMS, FINE_DIMS, JITTER_ONE, MOST_SIDE, default_jitter, dims_of, levels_of, sides_at,
+};
 use super::appearance_image::{AppearanceImage, Features};
 use super::region::Region;
 use super::start::Start;
@@ -176,6 +178,18 @@ impl Plane {
             Levelled::Coarse(level) => size_of_val(&level.values[..]),
         };
         self.levels.iter().map(level).sum::<usize>() as u64
+    }
+
+    /// Bytes that the levels of any exemplar of a tile take at most.
+    pub fn most_bytes(tile: Size) -> u64 {
+        let exemplar = Size::new(tile.height.min(MOST_SIDE), tile.width.min(MOST_SIDE));
+        let count = levels_of(exemplar);
+        let level = |number: usize| {
+            // With a margin on every side.
+            let [height, width] = [exemplar.height, exemplar.width].map(|side| side + (2 << number));
+            (height * width * dims_of(number, count)) as u64
+        };
+        (0..count).map(level).sum()
     }
 
     /// Checks a variation, as [`Plane::window`] does.

@@ -240,6 +240,7 @@ fn polynomials(terms: &[[f64; TERMS]], fit: &DMatrix<f64>, values: &[f32], chann
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
 
     #[test]

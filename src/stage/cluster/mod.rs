@@ -47,7 +47,7 @@ pub use reuse::{Options as ReuseOptions, Plan as ReusePlan, plan as plan_reuse};
 const MOST_CLUSTERS: usize = 1 << 16;
 
 /// Clusters where no number is given.
-const USUAL_CLUSTERS: usize = 256;
+pub(crate) const USUAL_CLUSTERS: usize = 256;
 
 /// Most clusters that a search for an error goes up to.
 const MOST_SEARCHED: usize = 4096;

@@ -6,6 +6,7 @@
 
 mod place;
 pub mod recipe;
+mod status;
 mod verify;
 
 use std::ops::Range;
@@ -25,15 +26,23 @@ use crate::run::progress::Counted;
 use crate::run::recipe::Recipe;
 use crate::run::shard::Shard;
 use crate::run::{Context, read_ahead};
+use crate::shape::Size;
 use crate::stage::image::{self, Scene, Subject};
 
 use place::PyramidFiles;
 use recipe::PyramidRecipe;
+pub(crate) use status::{TilesFound, tiles};
 pub use verify::Pyramidal;
 pub(crate) use verify::{about, verify};
 
 /// Sides of a tile that are allowed.
 pub(crate) const TILE_SIDES: std::ops::RangeInclusive<usize> = 8..=4096;
+
+/// Side of a tile unless it is given.
+pub const TILE_SIDE: usize = 254;
+
+/// Overlap of tiles unless it is given.
+pub const OVERLAP: usize = 1;
 
 /// Memory for what does not grow with the picture: the program itself, threads, packers.
 const FIXED_BYTES: u64 = 16 << 20;
@@ -56,6 +65,23 @@ pub struct Options {
     /// The part of the rows of tiles of each level that this run encodes. All rows of the picture are gone through for
     /// it; encoding is most of the work.
     pub shard: Shard,
+}
+
+/// Memory that is enough for a pyramid of an enlargement, with tiles as they are unless something else is asked for. The
+/// enlargement need not be there: it is of this size, its model's tile of at most so many texels.
+pub(crate) fn enough_bytes(size: Size, tile_texels: usize, threads: usize) -> u64 {
+    let pyramid = Pyramid { size, side: TILE_SIDE, overlap: OVERLAP };
+    // A row of the enlargement as it is read, and the colours of the tile.
+    let (row, tile) = (size.width * 2 * size_of::<u32>(), tile_texels * size_of::<[f32; 3]>());
+    memory_bytes(&pyramid, threads) + (row + tile) as u64
+}
+
+/// Memory of the levels, a row of the source and the tiles in work; bands of the source come on top of it.
+fn memory_bytes(pyramid: &Pyramid, threads: usize) -> u64 {
+    let tile = 3 * (pyramid.side + 2 * pyramid.overlap).pow(2) as u64;
+    // Pixels, filtered or transformed pixels, and the file.
+    let row = (pyramid.size.width * size_of::<[f32; 3]>()) as u64;
+    FIXED_BYTES + Cascade::memory_bytes(pyramid) + row + threads as u64 * 4 * tile
 }
 
 /// A pyramid, ready to be made.
@@ -130,17 +156,9 @@ impl Plan {
             "units": self.pyramid.tiles(),
             "unit": "tile",
             "levels": self.pyramid.top() + 1,
-            "memory_bytes": self.memory_bytes(context),
+            "memory_bytes": memory_bytes(&self.pyramid, context.threads),
             "recipe": self.recipe,
         })
-    }
-
-    /// Memory of the levels, a row of the source and the tiles in work; bands of the source come on top of it.
-    fn memory_bytes(&self, context: &Context<'_>) -> u64 {
-        let tile = 3 * (self.pyramid.side + 2 * self.pyramid.overlap).pow(2) as u64;
-        // Pixels, filtered or transformed pixels, and the file.
-        let row = (self.pyramid.size.width * size_of::<[f32; 3]>()) as u64;
-        FIXED_BYTES + Cascade::memory_bytes(&self.pyramid) + row + context.threads as u64 * 4 * tile
     }
 
     /// Makes the tiles that are not there yet, then the page and the description.
@@ -149,7 +167,7 @@ impl Plan {
     /// A picture too wide for the memory that is allowed, and those of reading and writing.
     pub fn run(&self, context: &Context<'_>) -> Result<Report> {
         let window = self.pyramid.size.window();
-        let needed = self.memory_bytes(context);
+        let needed = memory_bytes(&self.pyramid, context.threads);
         let (in_flight, bands) = self.scene.bands_in_flight("a pyramid", needed, context)?;
         let texts = self.texts()?;
         self.place.begin(&self.recipe, context)?;

@@ -62,6 +62,34 @@ impl PyramidFiles {
         self.folder.join(level.to_string()).join(format!("{column}_{row}.{}", self.ending))
     }
 
+    /// Row and column of each tile of a level that is there; none where the level has no folder yet.
+    ///
+    /// # Errors
+    /// Those of listing.
+    pub(super) fn tiles_found(&self, level: u32) -> Result<Vec<[usize; 2]>> {
+        let folder = self.folder.join(level.to_string());
+        let failed = |error| Error::io("list", &folder, error);
+        let entries = match std::fs::read_dir(&folder) {
+            Err(error) if metadata::is_absent(&error) => return Ok(Vec::new()),
+            entries => entries.map_err(failed)?,
+        };
+        let mut found = Vec::new();
+        for entry in entries {
+            let path = entry.map_err(failed)?.path();
+            let stem = path.file_stem().and_then(|stem| stem.to_str());
+            let place = stem.and_then(|stem| stem.split_once('_'));
+            let numbers = place.and_then(|(column, row)| Some([row.parse().ok()?, column.parse().ok()?]));
+            // What bears just the name of a tile, with no zeros before it.
+            if let Some([row, column]) = numbers
+                && path == self.tile(level, row, column)
+                && path.is_file()
+            {
+                found.push([row, column]);
+            }
+        }
+        Ok(found)
+    }
+
     /// Checks that nothing lies there, or what the same recipe began, or what may be replaced.
     ///
     /// # Errors

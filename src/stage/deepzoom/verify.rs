@@ -16,10 +16,12 @@ use crate::picture::deepzoom::{Encoding, page};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::run::recipe::Recipe;
+use crate::run::shard::Shard;
 use crate::shape::Size;
 use crate::stage::kept::{Kept, bytes_below};
 use crate::stage::verify::report::Report;
 use crate::store::recognise::PYRAMID_FOLDER;
+use crate::words::counted;
 use crate::zarr::checksums::DIGITS;
 use crate::zarr::metadata;
 
@@ -85,17 +87,17 @@ fn open(path: &Path) -> Result<MappedFile> {
 }
 
 /// A pyramid that is there.
-struct Opened {
-    description: PathBuf,
-    state: State,
+pub(super) struct Opened {
+    pub(super) description: PathBuf,
+    pub(super) state: State,
     recipe: PyramidRecipe,
-    pyramid: Pyramid,
-    place: PyramidFiles,
+    pub(super) pyramid: Pyramid,
+    pub(super) place: PyramidFiles,
 }
 
 impl Opened {
     /// The pyramid whose description, or folder of tiles, lies at a path.
-    fn at(path: &Path) -> Result<Self> {
+    pub(super) fn at(path: &Path) -> Result<Self> {
         let path: PathBuf = path.components().collect();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let description = match name.strip_suffix(PYRAMID_FOLDER) {
@@ -143,11 +145,12 @@ pub(crate) fn about(path: &Path) -> Result<Pyramidal> {
     })
 }
 
-/// Reads all of a pyramid: `path` is its description or the folder of its tiles.
+/// Reads all of a pyramid, or a part of the rows of tiles of each level: `path` is its description or the folder of its
+/// tiles.
 ///
 /// # Errors
 /// Where there is none, or its recipe is damaged; and those of the operating system.
-pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
+pub(crate) fn verify(path: &Path, shard: Shard, context: &Context<'_>) -> Result<Report> {
     let Opened { description, state, recipe, pyramid, place } = Opened::at(path)?;
     let mut report = Report::new("deepzoom");
     report.checked("size", pyramid.size.to_string());
@@ -162,10 +165,12 @@ pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
             "run the command that makes the pyramid again; it only ends it",
         );
     }
+    let mut looked_at = 0;
     context.progress.begin("verify", pyramid.tiles(), Counted::Items("tiles"));
     for level in 0..=pyramid.top() {
         let grid = pyramid.grid(pyramid.level(level));
-        for row in 0..grid.height {
+        for row in (0..grid.height).filter(|&row| shard.has(row)) {
+            looked_at += grid.width;
             context.check_stop()?;
             let before = report.findings.len();
             let looked: Vec<Result<()>> = context.install(|| {
@@ -203,6 +208,10 @@ pub(crate) fn verify(path: &Path, context: &Context<'_>) -> Result<Report> {
         }
     }
     context.progress.end();
+    if shard != Shard::WHOLE {
+        let tiles = counted(pyramid.tiles() as usize, "tile");
+        report.notes.push(shard.looked_at(looked_at, &tiles));
+    }
     Ok(report)
 }
 

@@ -21,7 +21,7 @@ pub(super) const UNIT: &str = "blocks of shards";
 const TEXEL_BYTES: u64 = 24;
 
 /// Memory for what does not grow: the program itself.
-pub(super) const FIXED_BYTES: u64 = 8 << 20;
+const FIXED_BYTES: u64 = 8 << 20;
 
 /// What is written beside the index.
 #[derive(Clone, Copy, Debug)]
@@ -87,15 +87,17 @@ impl Tile {
     }
 }
 
-/// Blocks of an output.
-pub(super) fn count(subject: &Subject) -> usize {
-    blocks(subject.options.size, BLOCK_SHARDS).count()
+/// Blocks of an output of this size.
+pub(crate) fn count(size: Size) -> usize {
+    let Size { height, width } = size;
+    let side = BLOCK_SHARDS * SHARD_SIDE;
+    height.div_ceil(side) * width.div_ceil(side)
 }
 
 /// Memory of a block in work, and what does not grow.
-pub(super) fn memory_bytes(subject: &Subject) -> u64 {
+pub(super) fn memory_bytes(size: Size) -> u64 {
     let side = BLOCK_SHARDS * SHARD_SIDE;
-    let Size { height, width } = subject.options.size;
+    let Size { height, width } = size;
     FIXED_BYTES + (height.min(side) * width.min(side)) as u64 * TEXEL_BYTES
 }
 

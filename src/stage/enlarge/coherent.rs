@@ -57,7 +57,7 @@ impl Rule for Coherent {
     }
 
     fn units(&self, subject: &Subject) -> (&'static str, usize) {
-        (blocks::UNIT, blocks::count(subject))
+        (blocks::UNIT, blocks::count(subject.options.size))
     }
 
     fn describe(&self, recipe: &mut EnlargeRecipe) {
@@ -67,7 +67,7 @@ impl Rule for Coherent {
 
     /// The appearance of all levels, and a block in work.
     fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
-        self.plane.bytes() + blocks::memory_bytes(subject)
+        self.plane.bytes() + blocks::memory_bytes(subject.options.size)
     }
 
     fn advice(&self) -> &'static str {

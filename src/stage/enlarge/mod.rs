@@ -4,6 +4,7 @@
 
 mod blocks;
 pub mod coherent;
+mod enough;
 pub mod paper;
 pub mod patches;
 mod pipeline;
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-pub(crate) use blocks::blocks_done;
+pub(crate) use blocks::{blocks_done, count as blocks_of};
+pub(crate) use enough::enough_bytes;
 
 use crate::error::{Error, Result};
 use crate::names::{ends_with, with_ending};

@@ -9,6 +9,7 @@ use crate::method::field::{Extent, Surface, Synthesis};
 use crate::method::index::nearest::NearestNormals;
 use crate::method::index::scan::Scan;
 use crate::run::Context;
+use crate::run::budget::OWN_BYTES;
 use crate::run::progress::Counted;
 use crate::run::recipe;
 use crate::run::shard::Shard;
@@ -54,10 +55,33 @@ struct Shared {
     kernel: Kernel,
 }
 
+impl Options {
+    /// Candidates of a tile of so many texels.
+    fn candidates(&self, texels: usize) -> usize {
+        self.candidates.unwrap_or(CANDIDATES.min(texels))
+    }
+
+    fn band_rows(&self, width: usize, candidates: usize) -> usize {
+        self.band_rows.unwrap_or(BAND_BYTES / Band::row_bytes(width, candidates)).clamp(1, SHARD_SIDE)
+    }
+}
+
+/// Memory that a run takes beside the field: the program, bands, a row of shards, and what belongs to a tile of so many
+/// texels and clusters.
+pub(super) fn bytes(options: &Options, size: Size, texels: usize, clusters: usize) -> u64 {
+    let Size { height, width } = size;
+    let candidates = options.candidates(texels);
+    let bands = BANDS * options.band_rows(width, candidates) * Band::row_bytes(width, candidates);
+    let texel_bytes = size_of::<u16>() + if options.keep_normals { size_of::<[f32; 3]>() } else { 0 };
+    let shards = SHARD_SIDE.min(height) * width * texel_bytes;
+    let tile = NearestNormals::most_bytes(texels) + clusters * clusters * size_of::<f32>();
+    OWN_BYTES + (bands + shards + tile) as u64
+}
+
 impl Paper {
     pub(super) fn open(subject: &Subject, options: &Options) -> Result<Self> {
         let texels = subject.tile.texels();
-        let candidates = options.candidates.unwrap_or(CANDIDATES.min(texels));
+        let candidates = options.candidates(texels);
         if !(1..=texels).contains(&candidates) {
             return Err(Error::usage(format!(
                 "got --candidates {candidates}, expected 1 to {texels} for a tile of {}",
@@ -74,11 +98,6 @@ impl Paper {
         let Size { height, width } = subject.options.size;
         let field_bytes = Synthesis::memory_bytes(&surface.field, height, width, extent(subject))?;
         Ok(Self { options: options.clone(), candidates, surface, field_bytes })
-    }
-
-    fn band_rows(&self, width: usize) -> usize {
-        let row_bytes = Band::row_bytes(width, self.candidates);
-        self.options.band_rows.unwrap_or(BAND_BYTES / row_bytes).clamp(1, SHARD_SIDE)
     }
 
     /// Makes one output.
@@ -122,7 +141,7 @@ impl Paper {
         let done = found * SHARD_SIDE;
         let stored_row = |y: usize| store.read(Window { y, x: 0, size: Size::new(1, width) });
         let shard_texels = SHARD_SIDE.min(height) * width;
-        let band_rows = self.band_rows(width);
+        let band_rows = self.options.band_rows(width, candidates);
         let source = Source { surface: &self.surface, field, height, width, band_rows };
         let chooser = Chooser {
             scan: &shared.scan,
@@ -171,16 +190,9 @@ impl Rule for Paper {
         recipe.keep_normals = self.options.keep_normals;
     }
 
-    /// Bands, a row of shards, the field, and what belongs to the tile.
     fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
-        let (candidates, keep_normals) = (self.candidates, self.options.keep_normals);
-        let Size { height, width } = subject.options.size;
-        let bands = BANDS * self.band_rows(width) * Band::row_bytes(width, candidates);
-        let texel_bytes = size_of::<u16>() + if keep_normals { size_of::<[f32; 3]>() } else { 0 };
-        let shards = SHARD_SIDE.min(height) * width * texel_bytes;
-        let clusters = subject.clusters.clusters;
-        let tile = NearestNormals::most_bytes(subject.tile.texels()) + clusters * clusters * size_of::<f32>();
-        (bands + shards + tile) as u64 + self.field_bytes
+        let (tile, clusters) = (subject.tile.texels(), subject.clusters.clusters);
+        bytes(&self.options, subject.options.size, tile, clusters) + self.field_bytes
     }
 
     fn advice(&self) -> &'static str {

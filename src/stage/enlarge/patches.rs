@@ -56,6 +56,15 @@ impl Maker<'_> {
     }
 }
 
+/// Memory that a run takes: the distances, the pieces, and a block in work.
+pub(super) fn bytes(exemplar_bytes: u64, pieces: Pieces, tile: Size, size: Size) -> u64 {
+    let pieces = match pieces {
+        Pieces::Tiles(count) => Tiles::bytes(tile, count),
+        Pieces::Repeat | Pieces::Roller => 0,
+    };
+    exemplar_bytes + pieces + blocks::memory_bytes(size)
+}
+
 /// The tile of a model and how far its texels differ.
 pub(super) fn exemplar(subject: &Subject, tile: &Tile) -> Result<Exemplar> {
     let wraps = subject.model.tile()?.wraps;
@@ -97,7 +106,7 @@ impl Rule for Patches {
     }
 
     fn units(&self, subject: &Subject) -> (&'static str, usize) {
-        (blocks::UNIT, blocks::count(subject))
+        (blocks::UNIT, blocks::count(subject.options.size))
     }
 
     fn describe(&self, recipe: &mut EnlargeRecipe) {
@@ -107,13 +116,8 @@ impl Rule for Patches {
         }
     }
 
-    /// The distances, the pieces, and a block in work.
     fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
-        let pieces = match self.pieces {
-            Pieces::Tiles(count) => Tiles::bytes(subject.tile, count),
-            Pieces::Repeat | Pieces::Roller => 0,
-        };
-        self.exemplar.bytes() + pieces + blocks::memory_bytes(subject)
+        bytes(self.exemplar.bytes(), self.pieces, subject.tile, subject.options.size)
     }
 
     fn advice(&self) -> &'static str {

@@ -1,12 +1,13 @@
 //! Image quilting: rows of blocks flow into rows of shards, from the top down. A killed run starts over and writes the
 //! rows of shards that are missing.
 
-use super::blocks::{FIXED_BYTES, Kept, Tile, is_done};
+use super::blocks::{Kept, Tile, is_done};
 use super::patches::exemplar;
 use super::{Output, Rule, Subject, Units};
 use crate::error::{Error, Result};
 use crate::method::baseline::{Exemplar, Quilt};
 use crate::run::Context;
+use crate::run::budget::OWN_BYTES;
 use crate::run::progress::Counted;
 use crate::run::shard::Shard;
 use crate::shape::{Size, Window};
@@ -82,6 +83,14 @@ impl Quilting {
     }
 }
 
+/// Memory that a run takes: the distances, a row of blocks, and a row of shards with what is written of it.
+pub(super) fn bytes(exemplar_bytes: u64, tile: Size, size: Size, keep_normals: bool) -> u64 {
+    let Size { height, width } = size;
+    let normals = if keep_normals { size_of::<[f32; 3]>() } else { 0 };
+    let shards = SHARD_SIDE.min(height) * width * (size_of::<u32>() + size_of::<u16>() + normals);
+    OWN_BYTES + exemplar_bytes + Quilt::bytes(tile, width) + shards as u64
+}
+
 impl Rule for Quilting {
     fn method(&self) -> Method {
         Method::Quilt
@@ -95,12 +104,8 @@ impl Rule for Quilting {
         self.kept.describe(recipe);
     }
 
-    /// The distances, a row of blocks, and a row of shards with what is written of it.
     fn memory_bytes(&self, subject: &Subject, _threads: usize) -> u64 {
-        let Size { height, width } = subject.options.size;
-        let normals = if self.kept.normals { size_of::<[f32; 3]>() } else { 0 };
-        let shards = SHARD_SIDE.min(height) * width * (size_of::<u32>() + size_of::<u16>() + normals);
-        FIXED_BYTES + self.exemplar.bytes() + Quilt::bytes(subject.tile, width) + shards as u64
+        bytes(self.exemplar.bytes(), subject.tile, subject.options.size, self.kept.normals)
     }
 
     fn advice(&self) -> &'static str {

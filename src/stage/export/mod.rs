@@ -74,7 +74,7 @@ type Written = (Made, Vec<String>);
 pub struct Source(Kept);
 
 enum Kept {
-    Measurement(Measurement),
+    Measurement(Box<Measurement>),
     /// The tile of a packed model.
     Packed(Box<Packed>),
 }
@@ -87,13 +87,13 @@ impl Source {
     pub fn open(path: &Path, context: &Context<'_>) -> Result<Self> {
         Ok(Self(match is_packed(path) {
             true => Kept::Packed(Box::new(Packed::open(path, context)?)),
-            false => Kept::Measurement(Measurement::open(path)?),
+            false => Kept::Measurement(Box::new(Measurement::open(path)?)),
         }))
     }
 
     /// Of a measurement that is open.
     pub fn of(measurement: Measurement) -> Self {
-        Self(Kept::Measurement(measurement))
+        Self(Kept::Measurement(Box::new(measurement)))
     }
 
     /// What there is to say of what was opened, a sentence each.

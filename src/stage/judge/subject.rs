@@ -76,6 +76,14 @@ impl Subject {
         }
     }
 
+    /// Digest of what is judged, beside the model.
+    pub(super) fn digest(&self) -> String {
+        match self {
+            Self::Enlarged(enlarged) => enlarged.digest().to_owned(),
+            Self::Plane { .. } => format!("plane of seed {SEED}"),
+        }
+    }
+
     pub(super) fn has_source(&self) -> bool {
         match self {
             Self::Enlarged(enlarged) => enlarged.has_source(),

@@ -28,7 +28,7 @@ pub(super) struct Codes {
 pub(super) fn look(
     subject: &Subject,
     material: &Material<'_>,
-    codes: &[Codes],
+    codes: &[&Codes],
     context: &Context<'_>,
 ) -> Result<(Verdict, [Option<f64>; 2])> {
     let size = subject.size();

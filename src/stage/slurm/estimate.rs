@@ -1,10 +1,11 @@
 //! What to ask Slurm for: memory by the plans of the stages, time by what a byte or a texel was measured to cost.
 
 use crate::run::budget::OWN_BYTES;
-use crate::stage::{cluster, import, tile};
+use crate::shape::Size;
+use crate::stage::{cluster, deepzoom, enlarge, import, tile};
 use crate::store::measurement::Description;
 
-use super::Options;
+use super::{Options, Parts, Surface};
 
 /// Processor time of a raw byte, nanoseconds: an import of a whole archive of JPEGs (docs/benchmarks.md).
 const IMPORT_NS: f64 = 11.0;
@@ -95,7 +96,7 @@ pub(super) struct Needs {
 
 impl Needs {
     /// `known` holds what is known of some of the materials.
-    pub(super) fn of(options: &Options, known: &[Facts]) -> Self {
+    pub(super) fn of(options: &Options, parts: Parts, known: &[Facts]) -> Self {
         let most = |of: &dyn Fn(&Facts) -> u64| known.iter().map(of).max().unwrap_or(0);
         let bytes = most(&|facts| facts.description.bytes()) as f64;
         let choice = options.tile.unwrap_or(tile::Choice::Auto);
@@ -109,16 +110,36 @@ impl Needs {
         let clusters = options.clusters.map_or(USUAL_CLUSTERS, |clusters| clusters as f64);
         let clustering = bytes * CLUSTER_NS * 1e-9 * (clusters / USUAL_CLUSTERS).max(1.0);
         let texels = options.surface.as_ref().map_or(0.0, |surface| surface.size.texels() as f64) * 1e-9;
-        let enlarging = texels * ENLARGE_NS / options.enlarge_parts() as f64;
-        let [imports, assigns] = [options.parts, options.cluster_parts].map(|parts| parts.max(1) as f64);
+        let [imports, assigns, enlargements] =
+            [parts.import, parts.cluster, parts.enlarge].map(|parts| parts.max(1) as f64);
+        let [enlarge_bytes, pyramid_bytes] = surface_bytes(options, known);
         Self {
             import: Need::new(options, view_bytes, bytes * IMPORT_NS * 1e-9 / imports),
             tile: Need::new(options, model_bytes, clustering / 4.0),
             // A clustering takes some ten passes or more, of which the first is the longest.
             assign: Need::new(options, model_bytes, clustering / 2.0 / assigns),
             model: Need::new(options, model_bytes, clustering),
-            enlarge: Need::new(options, 0, enlarging),
-            pyramid: Need::new(options, 0, texels * PYRAMID_NS),
+            enlarge: Need::new(options, enlarge_bytes, texels * ENLARGE_NS / enlargements),
+            // Each part goes through all rows.
+            pyramid: Need::new(options, pyramid_bytes, texels * PYRAMID_NS),
         }
     }
+}
+
+/// Memory that is enough for the enlargement of any material, and for its pyramid.
+fn surface_bytes(options: &Options, known: &[Facts]) -> [u64; 2] {
+    let Some(Surface { size, by, .. }) = &options.surface else { return [0; 2] };
+    let tile_of = |facts: &Facts| match options.tile {
+        Some(tile::Choice::Sized(size)) => size,
+        _ => facts.description.size,
+    };
+    let clusters = options.clusters.unwrap_or(cluster::USUAL_CLUSTERS);
+    // What the size alone takes counts also where no material is known.
+    let tiles = known.iter().map(tile_of).chain([Size::new(1, 1)]);
+    tiles.fold([0; 2], |[most, most_of_pyramid], tile| {
+        [
+            most.max(enlarge::enough_bytes(by, *size, tile, clusters)),
+            most_of_pyramid.max(deepzoom::enough_bytes(*size, tile.texels(), options.cpus)),
+        ]
+    })
 }

@@ -17,7 +17,8 @@ use crate::error::{Error, ErrorKind, Result};
 use crate::names::with_ending;
 use crate::run::Context;
 use crate::shape::Size;
-use crate::stage::{import, tile};
+use crate::stage::enlarge::{By, blocks_of};
+use crate::stage::{deepzoom, import, tile};
 use crate::store::measurement::{self, Measurement};
 use crate::store::{kind_of, recognise};
 use estimate::{Facts, Need, Needs};
@@ -37,7 +38,7 @@ pub struct Options {
     /// The folder of all stores that are made; where absent, the current folder for measurements, and that of each
     /// measurement for what is made of it.
     pub into: Option<PathBuf>,
-    /// Parts of an import, and of an enlargement that can be made in parts.
+    /// Most parts of an import, of an enlargement that can be made in parts, and of a pyramid.
     pub parts: usize,
     /// Parts of a pass of the clustering. With one, a single job makes the model.
     pub cluster_parts: usize,
@@ -64,10 +65,6 @@ impl Options {
     fn in_parts(&self) -> bool {
         self.parts > 1 || self.cluster_parts > 1
     }
-
-    fn enlarge_parts(&self) -> usize {
-        if self.surface.as_ref().is_some_and(|surface| surface.in_parts) { self.parts } else { 1 }
-    }
 }
 
 /// An enlargement.
@@ -77,8 +74,38 @@ pub struct Surface {
     pub size: Size,
     /// The method, as the command line names it.
     pub method: String,
-    /// Whether it can be made in parts.
-    pub in_parts: bool,
+    /// The method, as it is unless more is said.
+    pub by: By,
+}
+
+/// Parts that the work on a material is divided into: no more than there are units of work in the largest.
+#[derive(Clone, Copy, Debug)]
+struct Parts {
+    import: usize,
+    cluster: usize,
+    enlarge: usize,
+    pyramid: usize,
+}
+
+impl Parts {
+    /// `known` holds what is known of `materials` materials.
+    fn of(options: &Options, known: &[Facts], materials: usize) -> Self {
+        let views = known.iter().map(|facts| facts.description.views.len()).max();
+        // What is not known may have any number of views.
+        let views = views.filter(|_| known.len() == materials).unwrap_or(usize::MAX);
+        let (mut enlarge, mut pyramid) = (1, 1);
+        if let Some(Surface { size, by, .. }) = &options.surface {
+            enlarge = match by {
+                // They go from the top down.
+                By::Paper(_) | By::Quilt(_) => 1,
+                By::Coherent(_) | By::Patches(_) => blocks_of(*size),
+            };
+            pyramid = size.height.div_ceil(deepzoom::TILE_SIDE);
+        }
+        let [import, enlarge, pyramid] =
+            [views, enlarge, pyramid].map(|units| options.parts.min(units).max(1));
+        Self { import, cluster: options.cluster_parts, enlarge, pyramid }
+    }
 }
 
 /// A material: what it is read from, and what is made of it. All paths are absolute.
@@ -111,11 +138,11 @@ struct Script {
 }
 
 /// A stage of the work, as an array of tasks.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Job {
     script: &'static str,
     what: &'static str,
-    command: &'static str,
+    command: String,
     /// Tasks of one material.
     tasks: usize,
     /// The setting that says how many these are.
@@ -178,8 +205,9 @@ pub fn plan(options: &Options) -> Result<Plan> {
         return Err(Error::usage(format!("two materials would both become {}", twice[0].display()))
             .hint("rename one of them, or give them in two lists"));
     }
-    let needs = Needs::of(options, &known);
-    let (scripts, jobs) = scripts::write(options, &materials, &needs);
+    let parts = Parts::of(options, &known, materials.len());
+    let needs = Needs::of(options, parts, &known);
+    let (scripts, jobs) = scripts::write(options, &materials, parts, &needs);
     Ok(Plan { folder: options.folder.clone(), scripts, jobs, materials: materials.len(), notes })
 }
 

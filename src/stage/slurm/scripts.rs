@@ -1,8 +1,10 @@
 //! The texts of the scripts.
 
 use super::estimate::{Need, Needs};
+use crate::stage::enlarge::By;
+
 use super::shell::{long_list, short_list, variable};
-use super::{Job, Material, Options, Script};
+use super::{Job, Material, Options, Parts, Script};
 
 /// How often a task is run again after it was stopped.
 const REQUEUES: u32 = 10;
@@ -21,10 +23,15 @@ const SUBMIT: &str = include_str!("scripts/submit-begin.sh");
 const STATUS: &str = include_str!("scripts/status.sh");
 
 /// All scripts of a folder, and the jobs among them in their order.
-pub(super) fn write(options: &Options, materials: &[Material], needs: &Needs) -> (Vec<Script>, Vec<Job>) {
-    let jobs = jobs(options, materials, needs);
+pub(super) fn write(
+    options: &Options,
+    materials: &[Material],
+    parts: Parts,
+    needs: &Needs,
+) -> (Vec<Script>, Vec<Job>) {
+    let jobs = jobs(options, materials, parts, needs);
     let mut scripts = vec![
-        Script { name: "settings.sh", text: settings(options, materials), is_run: false },
+        Script { name: "settings.sh", text: settings(options, materials, &jobs), is_run: false },
         Script { name: "steps.sh", text: STEPS.as_bytes().to_vec(), is_run: false },
         Script { name: "submit.sh", text: submit(options, &jobs).into_bytes(), is_run: true },
         Script { name: "status.sh", text: status(options).into_bytes(), is_run: true },
@@ -35,9 +42,14 @@ pub(super) fn write(options: &Options, materials: &[Material], needs: &Needs) ->
     (scripts, jobs)
 }
 
-fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
+fn jobs(options: &Options, materials: &[Material], parts: Parts, needs: &Needs) -> Vec<Job> {
     let mut jobs = Vec::new();
-    let mut add = |script, what, command, tasks, parts, need: Need| {
+    // Where an array goes over materials, its tasks are no parts of one.
+    let in_parts = options.in_parts();
+    let mut add = |script, what, command: &str, tasks, parts: Option<&'static str>, need: Need| {
+        let parts = parts.filter(|_| in_parts);
+        let shard = parts.map(|parts| format!(" --shard \"$part/${parts}\"")).unwrap_or_default();
+        let command = format!("{command}{shard}");
         jobs.push(Job { script, what, command, tasks, parts, need });
     };
     if materials.iter().any(|material| material.archive.is_some()) {
@@ -45,9 +57,8 @@ fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
             "import.sh",
             "Imports an archive, or one part of its views.",
             "[ -n \"${archives[material]}\" ] || finish 0\n\
-             run import \"${import_options[@]}\" \"${archives[material]}\" \"${measurements[material]}\" \
-             --shard \"$part/$import_parts\"",
-            options.parts,
+             run import \"${import_options[@]}\" \"${archives[material]}\" \"${measurements[material]}\"",
+            parts.import,
             Some("import_parts"),
             needs.import,
         );
@@ -74,8 +85,8 @@ fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
             "Assigns one part of the texels to their clusters, in one pass. Nothing is left to do if the clustering has\n\
              # ended before.",
             "run cluster \"${cluster_options[@]}\" \"${measurements[material]}\" \"${models[material]}\" \
-             --step assign --pass \"$BTF_PASS\" --shard \"$part/$cluster_parts\"",
-            options.cluster_parts,
+             --step assign --pass \"$BTF_PASS\"",
+            parts.cluster,
             Some("cluster_parts"),
             needs.assign,
         );
@@ -99,27 +110,20 @@ fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
         needs.model,
     );
     if let Some(surface) = &options.surface {
-        let (command, parts) = match surface.in_parts {
-            true => (
-                "run enlarge \"${enlarge_options[@]}\" \"${models[material]}\" \"${planes[material]}\" \
-                 --shard \"$part/$enlarge_parts\"",
-                Some("enlarge_parts"),
-            ),
-            false => (
-                "run enlarge \"${enlarge_options[@]}\" \"${models[material]}\" \"${planes[material]}\"",
-                None,
-            ),
+        let command = "run enlarge \"${enlarge_options[@]}\" \"${models[material]}\" \"${planes[material]}\"";
+        let shared = match surface.by {
+            By::Paper(_) | By::Quilt(_) => None,
+            By::Coherent(_) | By::Patches(_) => Some("enlarge_parts"),
         };
         let what = "Enlarges the model of a material, or makes one part of the enlargement.";
-        add("enlarge.sh", what, command, options.enlarge_parts(), parts, needs.enlarge);
+        add("enlarge.sh", what, command, parts.enlarge, shared, needs.enlarge);
     }
     if options.pyramids {
         add(
             "deepzoom.sh",
             "Makes a Deep Zoom pyramid of an enlargement, or one part of its tiles.",
-            "run export \"${deepzoom_options[@]}\" \"${planes[material]}\" \"${pyramids[material]}\" --deepzoom \
-             --shard \"$part/$deepzoom_parts\"",
-            options.parts,
+            "run export \"${deepzoom_options[@]}\" \"${planes[material]}\" \"${pyramids[material]}\" --deepzoom",
+            parts.pyramid,
             Some("deepzoom_parts"),
             needs.pyramid,
         );
@@ -127,7 +131,7 @@ fn jobs(options: &Options, materials: &[Material], needs: &Needs) -> Vec<Job> {
     jobs
 }
 
-fn settings(options: &Options, materials: &[Material]) -> Vec<u8> {
+fn settings(options: &Options, materials: &[Material], jobs: &[Job]) -> Vec<u8> {
     let mut text = Vec::new();
     let mut say = |comment: &str, lines: Vec<u8>| {
         for line in comment.lines() {
@@ -179,18 +183,12 @@ fn settings(options: &Options, materials: &[Material]) -> Vec<u8> {
         let comment = "Options of btf export --deepzoom, such as --format jpeg or --light 60,90.";
         say(comment, short_list("deepzoom_options", nothing));
     }
-    let number = |name: &str, value: usize| format!("{name}={value}\n").into_bytes();
-    let mut parts = number("import_parts", options.parts);
-    if options.surface.as_ref().is_some_and(|surface| surface.in_parts) {
-        parts.extend(number("enlarge_parts", options.parts));
+    let parts: Vec<String> =
+        jobs.iter().filter_map(|job| Some(format!("{}={}\n", job.parts?, job.tasks))).collect();
+    if !parts.is_empty() {
+        let comment = "Parts that the work on one material is divided into. Any number gives the same bytes.";
+        say(comment, parts.concat().into_bytes());
     }
-    if options.pyramids {
-        parts.extend(number("deepzoom_parts", options.parts));
-    }
-    if options.cluster_parts > 1 {
-        parts.extend(number("cluster_parts", options.cluster_parts));
-    }
-    say("Parts that the work on one material is divided into. Any number gives the same bytes.", parts);
     if options.cluster_parts > 1 {
         say(
             "Passes of a clustering that are shared between jobs; the job `model` makes the rest, if there is any.",
@@ -281,11 +279,12 @@ fn submit(options: &Options, jobs: &[Job]) -> String {
     if in_parts {
         text.push_str("done\n");
     }
-    text.push_str("echo \"how far they are: squeue --me, and status.sh; to cancel them: scancel \\$(cat $(printf %q \"$PWD/jobs\"))\"\n");
+    text.push_str("echo \"how far they are: squeue --me, and status.sh; to cancel them: $cancel\"\n");
     text
 }
 
 fn status(options: &Options) -> String {
     let planes = if options.surface.is_some() { " \"${planes[@]}\"" } else { "" };
-    format!("{STATUS}exec \"$btf\" status \"${{measurements[@]}}\" \"${{models[@]}}\"{planes}\n")
+    let pyramids = if options.pyramids { " \"${pyramids[@]}\"" } else { "" };
+    format!("{STATUS}exec \"$btf\" status \"${{measurements[@]}}\" \"${{models[@]}}\"{planes}{pyramids}\n")
 }

@@ -44,7 +44,7 @@ pub struct Beside<'a> {
     pub source: Option<&'a dyn Source>,
     /// The model of an enlarged index; beside it where absent.
     pub model: Option<PathBuf>,
-    /// The part of the views, or of the rows of shards, that is looked at.
+    /// The part of the views, or of the rows of shards or tiles, that is looked at.
     pub shard: Shard,
 }
 
@@ -63,12 +63,12 @@ pub fn run(path: &Path, beside: &Beside<'_>, context: &Context<'_>) -> Result<Fo
     if beside.model.is_some() && kind != Some(index::KIND) {
         return Err(refused("only an enlargement is compared with its model").hint("leave out --model"));
     }
-    if beside.shard != Shard::WHOLE && !matches!(kind, Some(measured::KIND | index::KIND)) {
-        let what = "only measurements and enlargements are verified in parts, and this is neither";
+    if beside.shard != Shard::WHOLE && kind == Some(modelled::KIND) {
+        let what = "a model is verified as a whole";
         return Err(refused(what).hint("leave out --shard"));
     }
     Ok(match kind {
-        None => Found::Other(deepzoom::verify(path, context)?),
+        None => Found::Other(deepzoom::verify(path, beside.shard, context)?),
         Some(modelled::KIND) => Found::Other(model::run(&Model::open(path)?, context)?),
         Some(index::KIND) => {
             Found::Other(enlarged::run(path, beside.model.as_deref(), beside.shard, context)?)

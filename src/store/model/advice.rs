@@ -9,6 +9,7 @@ use super::tile::TileRecipe;
 use super::{Model, Stage};
 use crate::error::Error;
 use crate::names::with_ending;
+use crate::run::recipe::Recipe;
 use crate::store::measurement::Measurement;
 use crate::store::origin;
 
@@ -41,13 +42,18 @@ impl Model {
 
     /// Whether it was unpacked from a file that does not say which texels of which measurement its tile holds.
     pub(crate) fn is_unpacked(&self) -> bool {
-        let is_packed =
-            || Ok::<_, Error>(self.recipe::<ComponentsRecipe>(Stage::Components)?.packed.is_some());
-        self.has(Stage::Components).unwrap_or(false)
-            && is_packed().unwrap_or(false)
-            && self
-                .recipe::<TileRecipe>(Stage::Tile)
-                .is_ok_and(|recipe| recipe.measurement.starts_with(UNPACKED))
+        let is_packed = || {
+            let recipe = self.recipe_if_any::<ComponentsRecipe>(Stage::Components);
+            recipe.is_some_and(|recipe| recipe.packed.is_some())
+        };
+        let tile = self.recipe_if_any::<TileRecipe>(Stage::Tile);
+        tile.is_some_and(|recipe| recipe.measurement.starts_with(UNPACKED)) && is_packed()
+    }
+
+    /// The recipe of a stage, without an error where there is none: that would ask for advice in turn.
+    fn recipe_if_any<T: Recipe>(&self, stage: Stage) -> Option<T> {
+        let value = self.recipe_text(stage).ok().flatten()?;
+        T::from_value(&value).ok()
     }
 
     /// The commands that make the result of a stage, with those of earlier stages that are missing too.
@@ -85,7 +91,7 @@ impl Model {
 
     /// The measurement that it was made of where it is found, else a word for it.
     fn likely_measurement(&self) -> String {
-        let digest = self.recipe::<TileRecipe>(Stage::Tile).ok().map(|recipe| recipe.measurement);
+        let digest = self.recipe_if_any::<TileRecipe>(Stage::Tile).map(|recipe| recipe.measurement);
         let name = measurement_name(self.path());
         let places = origin::places(self.path(), origin::MEASUREMENT, name.to_str());
         let found = places.into_iter().find(|place| {

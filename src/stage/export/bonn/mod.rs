@@ -42,7 +42,7 @@ pub(super) fn dfmf(source: &Source, options: &Options, context: &Context<'_>) ->
         match &factors {
             Some(factors) => factors.iter().try_for_each(|factors| push(&mut writer, factors))?,
             None => {
-                (0..channels).try_for_each(|c| push_exact(&mut writer, source, Part::Channel(c), context))?
+                (0..channels).try_for_each(|c| push_exact(&mut writer, source, Part::Channel(c), context))?;
             }
         }
         writer.finish()?;

@@ -154,7 +154,7 @@ fn a_clustering_stays_within_its_memory() {
         let sum = (found.own + found.mapped) / MIB;
         println!("{allowed} MiB, {threads} threads: {sum} MiB");
         assert_eq!(found.code, Some(0));
-        // Room to spare for what an observer counts too: the program's code.
-        assert!(sum + 8 <= allowed, "{threads} threads: {sum} of {allowed} MiB");
+        // Room to spare, also for what an observer counts beside it: some 20 MiB of the program's code.
+        assert!(sum + 24 <= allowed, "{threads} threads: {sum} of {allowed} MiB");
     }
 }

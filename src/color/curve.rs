@@ -91,7 +91,7 @@ impl Linear {
 /// Samples that the curve does not hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Unheld {
-    /// Beyond its largest value, in either direction.
+    /// Beyond its range.
     pub(crate) beyond: u64,
     /// No finite numbers: they are 0 on it.
     pub(crate) not_finite: u64,
@@ -123,13 +123,13 @@ impl Curve {
         unheld
     }
 
-    /// The largest sample that the curve holds.
-    pub(crate) fn largest(&self) -> f64 {
+    /// The least and the largest sample that the curve holds.
+    pub(crate) fn range(&self) -> [f64; 2] {
         let value = f64::from(LARGEST) / f64::from(WHITE);
-        match self.transfer {
+        [-value, value].map(|value| match self.transfer {
             Transfer::Srgb => value,
             Transfer::Linear => srgb_decode(value),
-        }
+        })
     }
 }
 
@@ -214,16 +214,17 @@ mod tests {
         assert_eq!(values, [0.0, 0.0, 127.5, -LARGEST]);
         for transfer in [Transfer::Srgb, Transfer::Linear] {
             let curve = Curve::new(SampleType::F32, transfer);
-            let most = curve.largest() as f32;
+            let most = curve.range()[1] as f32;
             let given =
                 Samples::F32(vec![f32::NAN, f32::NEG_INFINITY, 0.999 * most, 1.001 * most, -3e30, 2.0]);
             assert_eq!(curve.unheld(&given, 0..6), Unheld { beyond: 2, not_finite: 2 });
             assert_eq!(curve.unheld(&given, 2..3), Unheld::default());
         }
-        let halves = Samples::F16(vec![f16::MAX, f16::NAN, f16::MIN]);
-        for transfer in [Transfer::Srgb, Transfer::Linear] {
-            let found = Curve::new(SampleType::F16, transfer).unheld(&halves, 0..3);
-            assert_eq!(found, Unheld { beyond: 0, not_finite: 1 });
+        // Below black the curve is straight and steep, so it ends earlier there.
+        let halves = Samples::F16(vec![f16::MAX, f16::NAN, f16::from_f32(-5e3), f16::MIN]);
+        for (transfer, beyond) in [(Transfer::Srgb, 0), (Transfer::Linear, 1)] {
+            let found = Curve::new(SampleType::F16, transfer).unheld(&halves, 0..4);
+            assert_eq!(found, Unheld { beyond, not_finite: 1 });
         }
     }
 }

@@ -234,7 +234,7 @@ fn samples_that_components_do_not_hold_are_refused_or_told() {
         });
         let told = fail(btf().arg("components").args([&store, &model]), 65);
         assert!(
-            told.contains("2 samples beyond") && told.contains("btf cluster"),
+            told.contains("2 samples out of range") && told.contains("btf cluster"),
             "{transfer} {large}: {told}"
         );
         let told = fail(btf().arg("pack").args([&model, &folder.path().join("m.btfc")]), 66);

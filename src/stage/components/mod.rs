@@ -161,7 +161,7 @@ impl Plan {
         })?;
         if unheld.beyond > 0 {
             context.progress.end();
-            return Err(self.beyond(unheld.beyond, pass.largest()));
+            return Err(self.beyond(unheld.beyond, pass.range()));
         }
         let mean: Vec<f32> = sums.iter().flatten().map(|sum| (sum / texels as f64) as f32).collect();
         let mut space = Space::random(mean.clone(), views, self.probes(), SEED);
@@ -177,13 +177,13 @@ impl Plan {
     }
 
     /// That samples are beyond what components hold: how far these are from them could not be said.
-    fn beyond(&self, count: u64, largest: f64) -> Error {
+    fn beyond(&self, count: u64, [least, largest]: [f64; 2]) -> Error {
         Error::input(format!(
-            "{}: {} beyond {largest:.3e} in either direction, expected what components hold",
+            "{}: {} out of range, expected {least:.3e} to {largest:.3e}, which components hold",
             self.measurement.path().display(),
             counted(count, "sample")
         ))
-        .hint("no material is as bright: import it again without these texels; clusters take any value (btf cluster)")
+        .hint("no material is like that: import it again without these texels; clusters take any value (btf cluster)")
     }
 
     /// Writes the arrays, then how it went.

@@ -60,9 +60,9 @@ impl BlockTexels<'_> {
 }
 
 impl<'a> Pass<'a> {
-    /// The largest sample that components hold.
-    pub(super) fn largest(&self) -> f64 {
-        self.curve.largest()
+    /// The least and the largest sample that components hold.
+    pub(super) fn range(&self) -> [f64; 2] {
+        self.curve.range()
     }
 
     pub(super) fn new(measurement: &'a Measurement, selection: &'a Selection, in_flight: usize) -> Self {

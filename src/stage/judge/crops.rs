@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::likeness::LEAST_SIDE;
+use crate::likeness::{Judge, Judgement, LEAST_SIDE, Lightness};
 use crate::shape::{Size, Window};
 
 /// Side of crops by default, as far as they fit. What J is depends on it: larger crops differ less from each other.
@@ -18,6 +18,30 @@ const LEAST_HELD_OUT_SIDE: usize = 96;
 
 /// More real crops say nothing new.
 const MOST: usize = 8;
+
+/// Where pictures are cut.
+pub(super) struct Crops {
+    pub(super) side: usize,
+    pub(super) reals: Vec<Window>,
+    pub(super) enlarged: Vec<Window>,
+    /// Rows and columns of crops of the plane that repeats the exemplar.
+    pub(super) repeated: Vec<[usize; 2]>,
+    /// Rows and columns within which crops of a regular material were moved into phase with real ones.
+    pub(super) cell: Option<Size>,
+}
+
+impl Crops {
+    /// Judges crops that were cut here.
+    pub(super) fn judge(&self, judge: &Judge, pictures: &[Lightness]) -> Result<Judgement> {
+        if self.cell.is_some() { judge.judge_partners(pictures) } else { judge.judge(pictures) }
+    }
+
+    /// The crops of the plane that repeats an exemplar.
+    pub(super) fn of_repeated(&self, exemplar: &Lightness) -> Vec<Lightness> {
+        let size = Size::new(self.side, self.side);
+        self.repeated.iter().map(|&[y, x]| exemplar.repeated(y, x, size)).collect()
+    }
+}
 
 /// Where real crops come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,23 +2,21 @@
 
 use std::sync::OnceLock;
 
-use btfkit_formats::Direction;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::crops::{self, Origin};
-use super::report::{self, LatticePeak, Normals, Pair, Report, Row, Rows};
+use super::codes::{Codes, codes_of, pictures_of, tile_codes};
+use super::crops::{self, Crops, Origin};
+use super::found::{Found, lattice_of, lattice_peak, mean, told};
+use super::report::{Normals, Report};
 use super::sheet::{self, Panels};
 use super::subject::Subject;
-use super::whole::{self, Codes, Material};
+use super::whole::{self, Material};
 use super::{Judged, Options, normals, pairs, phase};
 use crate::error::{Error, Result};
 use crate::lattice::WaveCounts;
-use crate::likeness::autocorrelation::near_shift;
-use crate::likeness::repetition::wavy_bands;
 use crate::likeness::verdict::Verdict;
-use crate::likeness::{Judge, Judgement, Lightness, Measure};
+use crate::likeness::{Judge, Lightness};
 use crate::method::tile::Tile;
 use crate::run::Context;
 use crate::run::progress::Counted;
@@ -27,36 +25,6 @@ use crate::shape::{Size, Window};
 use crate::stage::cluster::open_measurement_of;
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
-
-/// Rows of the measurement that are read together: a row of chunks.
-const BAND_ROWS: usize = 16;
-
-/// Side of the window in which wavy bands are sought.
-const WAVY_SIDE: usize = 768;
-
-/// Where pictures are cut.
-pub(super) struct Crops {
-    pub(super) side: usize,
-    pub(super) reals: Vec<Window>,
-    pub(super) enlarged: Vec<Window>,
-    /// Rows and columns of crops of the plane that repeats the exemplar.
-    repeated: Vec<[usize; 2]>,
-    /// Rows and columns within which crops of a regular material were moved into phase with real ones.
-    cell: Option<Size>,
-}
-
-impl Crops {
-    /// Judges crops that were cut here.
-    pub(super) fn judge(&self, judge: &Judge, pictures: &[Lightness]) -> Result<Judgement> {
-        if self.cell.is_some() { judge.judge_partners(pictures) } else { judge.judge(pictures) }
-    }
-
-    /// The crops of the plane that repeats an exemplar.
-    pub(super) fn of_repeated(&self, exemplar: &Lightness) -> Vec<Lightness> {
-        let size = Size::new(self.side, self.side);
-        self.repeated.iter().map(|&[y, x]| exemplar.repeated(y, x, size)).collect()
-    }
-}
 
 /// What a part of the work found.
 #[derive(Serialize, Deserialize)]
@@ -76,16 +44,6 @@ pub(super) struct Whole {
     verdict: Verdict,
     bands: [Option<f64>; 2],
     wavy_bands: [Option<f64>; 2],
-}
-
-/// What was found under one pair.
-#[derive(Serialize, Deserialize)]
-pub(super) struct Found {
-    own: Judgement,
-    alone: Option<Judgement>,
-    with_model: Judgement,
-    floor: [f64; Measure::ALL.len()],
-    lattice: Option<[f64; 2]>,
 }
 
 /// What all parts have in common.
@@ -120,7 +78,7 @@ impl<'a> Judging<'a> {
             context.compute(|| Subject::open(&options.subject, options.model.as_deref(), options.size))?;
         let measurement = open_measurement_of(&model, &options.measurement)?;
         let description = measurement.description();
-        let pairs = pairs_of(options, &measurement)?;
+        let pairs = pairs::chosen(options, &measurement)?;
         let (tile, index) = (model.tile()?, model.index()?);
         let centres = model.centres()?;
         let brdf = description.views.len() * description.lights.len();
@@ -324,7 +282,7 @@ impl<'a> Judging<'a> {
         let material = self.material();
         let (verdict, bands) = whole::look(&self.subject, &material, &codes, context)?;
         let wavy_bands = match codes.first() {
-            Some(codes) => context.compute(|| wavy(&self.subject, &material, codes))?,
+            Some(codes) => context.compute(|| whole::wavy(&self.subject, &material, codes))?,
             None => [None; 2],
         };
         Ok(Whole { verdict, bands, wavy_bands })
@@ -406,24 +364,6 @@ impl<'a> Judging<'a> {
     }
 }
 
-/// The pairs to judge under.
-fn pairs_of(options: &Options, measurement: &Measurement) -> Result<Vec<[usize; 2]>> {
-    let description = measurement.description();
-    let (views, lights) = (description.views.len(), description.lights.len());
-    match options.pairs.iter().find(|&&[view, light]| view >= views || light >= lights) {
-        Some([view, light]) => Err(Error::usage(format!(
-            "got the pair {view},{light}, expected a view from 0 to {} and a light from 0 to {}",
-            views.saturating_sub(1),
-            lights.saturating_sub(1)
-        ))
-        .hint(format!("btf info {} --directions lists them", measurement.path().display()))),
-        None if options.pairs.is_empty() => {
-            Ok(pairs::spread(&description.views, &description.lights, pairs::COUNT))
-        }
-        None => Ok(options.pairs.clone()),
-    }
-}
-
 /// The part of the tile that enlargements are made of, whether it wraps, and its lattice: that of the appearance where
 /// there is one.
 fn exemplar_of(model: &Model, tile: &Tile) -> Result<(Window, bool, WaveCounts)> {
@@ -433,112 +373,4 @@ fn exemplar_of(model: &Model, tile: &Tile) -> Result<(Window, bool, WaveCounts)>
     let appearance = model.appearance()?;
     appearance.check(tile.size)?;
     Ok((appearance.exemplar, appearance.wraps, appearance.lattice))
-}
-
-/// L* codes of the texels of a tile, as measured under a pair.
-fn tile_codes(
-    measurement: &Measurement,
-    tile: &Tile,
-    [view, light]: [usize; 2],
-    context: &Context<'_>,
-) -> Result<Vec<u8>> {
-    let bounds = tile.bounds();
-    let mut plane = Vec::with_capacity(bounds.size.texels());
-    for top in (0..bounds.size.height).step_by(BAND_ROWS) {
-        context.check_stop()?;
-        let rows = BAND_ROWS.min(bounds.size.height - top);
-        let band = Window { y: bounds.y + top, x: bounds.x, size: Size::new(rows, bounds.size.width) };
-        plane.extend(codes_of(measurement, [view, light], band)?);
-    }
-    Ok(tile.offsets_in_bounds().into_iter().map(|at| plane[at]).collect())
-}
-
-/// L* codes of a window under a pair.
-fn codes_of(
-    measurement: &Measurement,
-    [view, light]: [usize; 2],
-    window: Window,
-) -> Result<impl Iterator<Item = u8> + use<>> {
-    let lights = measurement.description().lights.len();
-    Ok(measurement.read_luminance(view, window)?.into_iter().skip(light).step_by(lights))
-}
-
-/// A window with the values measured where its texels come from, as far as that is known, and with the clusters' values.
-fn pictures_of(
-    subject: &Subject,
-    material: &Material<'_>,
-    codes: &Codes,
-    window: Window,
-) -> Result<(Option<Lightness>, Lightness)> {
-    let texels = subject.texels(window, material.clusters, material.tile)?;
-    let of_cluster = |&cluster: &u16| codes.clusters[usize::from(cluster)];
-    let of_texel = |texel: u32| codes.tile[texel as usize];
-    let with_model = Lightness::of_codes(window.size, texels.index.iter().map(of_cluster));
-    let source = texels.source;
-    let alone = source.map(|source| Lightness::of_codes(window.size, source.into_iter().map(of_texel)));
-    Ok((alone, with_model))
-}
-
-/// Mean autocorrelation at the periods of a lattice that half a crop holds: of an enlargement and of its exemplar.
-fn lattice_of(enlarged: &[Lightness], own: &[Lightness], periods: &[[f64; 2]]) -> Option<[f64; 2]> {
-    let side = enlarged.first()?.size.height as f64;
-    let fits = |period: &&[f64; 2]| period.iter().all(|length| length.abs() <= side / 2.0);
-    let periods: Vec<[f64; 2]> = periods.iter().filter(fits).copied().collect();
-    let mean = |pictures: &[Lightness]| {
-        let peaks: Vec<f64> = pictures
-            .par_iter()
-            .flat_map_iter(|picture| periods.iter().map(|&period| near_shift(picture, period)))
-            .collect();
-        crate::likeness::mean(&peaks)
-    };
-    (!periods.is_empty()).then(|| [mean(enlarged), mean(own)])
-}
-
-fn lattice_peak(found: &[Found]) -> Option<LatticePeak> {
-    let peaks: Vec<[f64; 2]> = found.iter().filter_map(|found| found.lattice).collect();
-    let mean =
-        |which: usize| crate::likeness::mean(&peaks.iter().map(|peak| peak[which]).collect::<Vec<_>>());
-    (!peaks.is_empty()).then(|| LatticePeak { enlarged: mean(0), own: mean(1) })
-}
-
-/// Wavy bands in a window in the middle.
-fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Option<f64>; 2]> {
-    let window = subject.size().middle(Size::new(WAVY_SIDE, WAVY_SIDE));
-    let texels = subject.texels(window, material.clusters, material.tile)?;
-    let values = match texels.source {
-        Some(source) => source.iter().map(|&texel| codes.tile[texel as usize]).collect::<Vec<_>>(),
-        None => texels.index.iter().map(|&cluster| codes.clusters[usize::from(cluster)]).collect(),
-    };
-    Ok(wavy_bands(&Lightness::of_codes(window.size, values), material.exemplar.size))
-}
-
-fn told(measurement: &Measurement, [view, light]: [usize; 2], found: &Found) -> Pair {
-    let description = measurement.description();
-    let degrees = |direction: Direction| {
-        let (theta, phi) = direction.degrees();
-        [theta, phi]
-    };
-    Pair {
-        view,
-        light,
-        view_deg: degrees(description.views[view]),
-        light_deg: degrees(description.lights[light]),
-        floor: report::by_name(&found.floor),
-        rows: Rows {
-            own: (&found.own).into(),
-            alone: found.alone.as_ref().map(Row::from),
-            with_model: (&found.with_model).into(),
-        },
-    }
-}
-
-/// Means over the pairs.
-fn mean(found: &[Found]) -> Result<Rows> {
-    let row = |judgements: Vec<Judgement>| Judgement::mean(&judgements).as_ref().map(Row::from);
-    let none = || Error::usage("no pair of directions to judge under");
-    Ok(Rows {
-        own: row(found.iter().map(|found| found.own).collect()).ok_or_else(none)?,
-        alone: row(found.iter().filter_map(|found| found.alone).collect()),
-        with_model: row(found.iter().map(|found| found.with_model).collect()).ok_or_else(none)?,
-    })
 }

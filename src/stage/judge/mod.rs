@@ -2,7 +2,9 @@
 //!
 //! Only crops are read, and rows that stream by. `docs/how-to/judge.md` says what the figures mean.
 
+mod codes;
 mod crops;
+mod found;
 mod judging;
 mod normals;
 mod pairs;

@@ -1,6 +1,6 @@
 //! The normal map judged as two pictures, n_x and n_y, against normals of the real crops by photometric stereo.
 
-use super::judging::Crops;
+use super::crops::Crops;
 use super::report::{NormalRows, Normals};
 use super::subject::Subject;
 use super::whole::Material;

@@ -2,11 +2,31 @@
 
 use btfkit_formats::Direction;
 
+use super::Options;
+use crate::error::{Error, Result};
+use crate::store::measurement::Measurement;
+
 /// Pairs by default.
 pub(super) const COUNT: usize = 5;
 
 /// Lower lights and views, degrees from the normal, show little but shadow and foreshortening.
 const LOWEST_DEG: f64 = 61.0;
+
+/// The pairs to judge under.
+pub(super) fn chosen(options: &Options, measurement: &Measurement) -> Result<Vec<[usize; 2]>> {
+    let description = measurement.description();
+    let (views, lights) = (description.views.len(), description.lights.len());
+    match options.pairs.iter().find(|&&[view, light]| view >= views || light >= lights) {
+        Some([view, light]) => Err(Error::usage(format!(
+            "got the pair {view},{light}, expected a view from 0 to {} and a light from 0 to {}",
+            views.saturating_sub(1),
+            lights.saturating_sub(1)
+        ))
+        .hint(format!("btf info {} --directions lists them", measurement.path().display()))),
+        None if options.pairs.is_empty() => Ok(spread(&description.views, &description.lights, COUNT)),
+        None => Ok(options.pairs.clone()),
+    }
+}
 
 /// Pairs (view, light) spread over the directions: the most frontal view under its lowest light first, then each time the
 /// pair that is farthest from those chosen.

@@ -1,13 +1,18 @@
 //! What only the whole of an enlargement shows, as its rows stream by: shares, copies, bands.
 
+use super::codes::Codes;
 use super::subject::Subject;
 use crate::error::Result;
+use crate::likeness::Lightness;
 use crate::likeness::copies::LargestCopy;
-use crate::likeness::repetition::Profiles;
+use crate::likeness::repetition::{Profiles, wavy_bands};
 use crate::likeness::verdict::{Tally, Verdict};
 use crate::run::Context;
 use crate::run::progress::Counted;
 use crate::shape::{Size, Window};
+
+/// Side of the window in which wavy bands are sought.
+const WAVY_SIDE: usize = 768;
 
 /// What does not depend on where one looks.
 pub(super) struct Material<'a> {
@@ -16,12 +21,6 @@ pub(super) struct Material<'a> {
     pub(super) exemplar: Window,
     pub(super) wraps: bool,
     pub(super) clusters: usize,
-}
-
-/// L* codes under a pair of directions: of the tile's texels as measured, and of the clusters.
-pub(super) struct Codes {
-    pub(super) tile: Vec<u8>,
-    pub(super) clusters: Vec<u8>,
 }
 
 /// The verdict, and the largest correlation of rows' and columns' means in any pair.
@@ -63,4 +62,15 @@ pub(super) fn look(
         profiles.iter().map(|profile| profile.bands(material.exemplar.size)).collect();
     let largest = |axis: usize| bands.iter().filter_map(|bands| bands[axis]).reduce(f64::max);
     Ok((tally.verdict(), [largest(0), largest(1)]))
+}
+
+/// Wavy bands in a window in the middle.
+pub(super) fn wavy(subject: &Subject, material: &Material<'_>, codes: &Codes) -> Result<[Option<f64>; 2]> {
+    let window = subject.size().middle(Size::new(WAVY_SIDE, WAVY_SIDE));
+    let texels = subject.texels(window, material.clusters, material.tile)?;
+    let values = match texels.source {
+        Some(source) => source.iter().map(|&texel| codes.tile[texel as usize]).collect::<Vec<_>>(),
+        None => texels.index.iter().map(|&cluster| codes.clusters[usize::from(cluster)]).collect(),
+    };
+    Ok(wavy_bands(&Lightness::of_codes(window.size, values), material.exemplar.size))
 }

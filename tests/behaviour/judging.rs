@@ -268,7 +268,7 @@ fn parts_of_a_judging_by_any_number_of_jobs_give_the_figures_of_one() {
     // What is judged otherwise shares nothing.
     let kept = other.path().join("parts");
     succeed(plane().arg("--partial").arg(&kept));
-    for more in [&["--pair", "0,0"][..], &["--pair", "0,1", "--crop", "48"]] {
+    for more in [&["--pair", "0,0"][..], &["--pair", "0,1", "--crop", "80"]] {
         let mut command = leather.judge("a.model.zarr");
         command.args(["--size", "288x256"]).args(more).arg("--partial").arg(&kept).arg("--reduce");
         assert!(fail(&mut command, 66).contains("0 of 3 parts"), "{more:?}");

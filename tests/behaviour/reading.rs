@@ -216,7 +216,7 @@ fn a_light_is_left_out_of_every_kind_of_archive() {
             archive.display()
         );
         let told = fail(btf().arg("info").arg(archive).args(["--drop-light", "99"]), 2);
-        assert!(told.contains("no light 99 to drop, there are 19"), "{told}");
+        assert!(told.contains("there is no light 99 to drop: lights are numbered 0 to 18"), "{told}");
     }
 }
 

@@ -506,7 +506,10 @@ fn the_stages_of_a_model_are_done_anew_by_force_and_what_builds_on_them_too() {
     assert_eq!(entries(), ["appearance", "cluster", "fit", "normals", "tile"]);
     let both = [&fixture().measurement(), &model];
     let told = btf().arg("normals").args(both).args(["--robust", "--force"]).output().unwrap();
-    assert!(String::from_utf8_lossy(&told.stderr).contains("stage fit"), "{told:?}");
+    assert!(
+        String::from_utf8_lossy(&told.stderr).contains("went with it: fit; to make it again: btf fit"),
+        "{told:?}"
+    );
     assert_eq!(entries(), ["appearance", "cluster", "normals", "tile"]);
     succeed(btf().arg("cluster").args(both).args(["--clusters", "5", "--force"]));
     assert_eq!(entries(), ["cluster", "normals", "tile"]);

@@ -90,6 +90,11 @@ impl Pack {
             report.psnr_db.map_or("not known".to_owned(), |psnr| format!("{psnr:.2} dB")),
             report.made.map_or("", found)
         ));
+        if report.components == 0 {
+            console.notes(&["no component fits into so few bytes: every texel of the file looks the same; \
+                             --quality 1:200 means 200 times smaller, --quality 200 means 200 bytes"
+                .to_owned()]);
+        }
         if let Some(more) = report.more {
             console.notes(&[format!(
                 "all {} of the model are in the file; at the same size, more of them may be nearer to the measurement: {more}",

@@ -24,7 +24,7 @@ use crate::store::model::tile::{TileRecipe, TileReport};
 use crate::store::model::{Model, Stage, UNPACKED};
 pub use crate::store::packed::{ENDING, is_packed};
 use crate::store::packed::{
-    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TRANSFER,
+    LICENCE, MEASUREMENT, Packed as OpenedFile, PackedFile, SAMPLES, TEXEL_MM, TILE, TRANSFER,
 };
 
 /// How small, or how good.
@@ -73,6 +73,9 @@ pub struct Packed {
     #[serde(skip)]
     pub made: Option<Made>,
 }
+
+/// Digits of the digest of a tile that a file keeps: enough to tell models apart.
+const TILE_DIGITS: usize = 16;
 
 /// Those that a model holds in its tile.
 const OF_THE_TILE: [&str; 3] = [SAMPLES, TRANSFER, MEASUREMENT];
@@ -190,6 +193,10 @@ fn unpacked_model(model: &Model) -> Result<packed::Model> {
     if tile.patch.is_none() {
         // Of a tile that is the whole measurement it can be told again which texel is which.
         texts.push((MEASUREMENT.to_owned(), model.recipe::<TileRecipe>(Stage::Tile)?.measurement));
+    } else {
+        // Of a tile that was cut, only its model knows it.
+        let digest = model.stage_digest(Stage::Tile)?;
+        texts.push((TILE.to_owned(), digest.chars().take(TILE_DIGITS).collect()));
     }
     Ok(packed::Model {
         size: tile.size,

@@ -23,6 +23,7 @@ pub const ENDING: &str = ".btfc";
 pub(crate) const SAMPLES: &str = "samples";
 pub(crate) const TRANSFER: &str = "transfer";
 pub(crate) const MEASUREMENT: &str = "measurement";
+pub(crate) const TILE: &str = "tile";
 pub(crate) const LICENCE: &str = "licence";
 pub(crate) const TEXEL_MM: &str = "texel_mm";
 
@@ -168,6 +169,8 @@ pub(crate) struct Packed {
     pub(crate) digest: String,
     /// Digest of the measurement, where the tile is all of it.
     pub(crate) measurement: Option<String>,
+    /// How the digest of the model's tile begins, where the tile is a part of a measurement.
+    pub(crate) tile: Option<String>,
     /// What else the file says: names and texts. Of what is exported, HDF5 files keep them.
     #[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
     pub(crate) texts: Vec<(String, String)>,
@@ -193,7 +196,7 @@ impl Packed {
     /// As it is evaluated, once it is decoded.
     pub(crate) fn of(file: PackedFile, from: packed::Model) -> Self {
         let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
-        let measurement = file.text(MEASUREMENT).map(str::to_owned);
+        let [measurement, tile] = [MEASUREMENT, TILE].map(|name| file.text(name).map(str::to_owned));
         let file_bytes = file.outline.bytes as u64;
         let (description, digest) = (file.description, file.digest);
         let list =
@@ -207,7 +210,18 @@ impl Packed {
             channels: from.channels,
         };
         let (wraps, texts) = (from.wraps, from.texts);
-        Self { components, description, wraps, digest, measurement, texts, notes, file_bytes, memory_bytes }
+        Self {
+            components,
+            description,
+            wraps,
+            digest,
+            measurement,
+            tile,
+            texts,
+            notes,
+            file_bytes,
+            memory_bytes,
+        }
     }
 }
 

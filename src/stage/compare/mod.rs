@@ -277,7 +277,20 @@ fn open_packed(options: &Options, context: &Context<'_>) -> Result<Subject> {
     let (measurement, tile, of) = match &options.tile_of {
         Some(path) => {
             let model = Model::open(path)?;
-            (open_measurement_of(&model, &options.measurement)?, model.tile()?, path.as_path())
+            let measurement = open_measurement_of(&model, &options.measurement)?;
+            let other = match (&packed.tile, &packed.measurement) {
+                (Some(tile), _) => !model.stage_digest(Stage::Tile)?.starts_with(tile.as_str()),
+                (None, Some(digest)) => digest != measurement.digest(),
+                (None, None) => false,
+            };
+            if other {
+                return Err(Error::recipe(format!(
+                    "{name} was not packed from {}, or from it as it was before",
+                    path.display()
+                ))
+                .hint("name the model that it was packed from"));
+            }
+            (measurement, model.tile()?, path.as_path())
         }
         None => {
             let measurement = Measurement::open(&options.measurement)?;

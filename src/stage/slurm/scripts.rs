@@ -230,7 +230,7 @@ fn script(options: &Options, job: &Job) -> String {
          #SBATCH --cpus-per-task={cpus}\n\
          # The program uses {memory_mib} MiB; Slurm may also count what it maps and what waits to be written.\n\
          #SBATCH --mem={slurm_mib}M\n\
-         # Minutes. The work was estimated at {seconds} seconds; a task that needs longer is stopped, and goes on.\n\
+         # Minutes. The work is estimated at {seconds} s; a task that needs longer is stopped, and goes on.\n\
          #SBATCH --time={minutes}\n\
          \n\
          memory={memory_mib}MiB\n\

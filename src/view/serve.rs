@@ -83,7 +83,8 @@ impl Server {
         }
         // One more connection lets the thread that waits for them see that no more are wanted.
         site.stopped.store(true, Ordering::Release);
-        let _ = TcpStream::connect((Ipv4Addr::LOCALHOST, site.port));
+        // Not for long: where all places are taken nobody accepts it, and the program ends with this thread.
+        let _ = TcpStream::connect_timeout(&(Ipv4Addr::LOCALHOST, site.port).into(), LOOK);
         Ok(())
     }
 }

@@ -314,9 +314,8 @@ pub(super) fn left_out(files: &Files, left: impl Iterator<Item = bool>) -> Optio
         .collect();
     let more = if names.len() > NAMED { format!(" and {} more", names.len() - NAMED) } else { String::new() };
     let shown = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
-    (!names.is_empty()).then(|| {
-        format!("pictures without directions, or of those that are dropped, are left out: {shown}{more}")
-    })
+    (!names.is_empty())
+        .then(|| format!("left out, as they have no direction or one that is dropped: {shown}{more}"))
 }
 
 /// What is missing or too often there, and how to go on without it; `swap` if what is called light is the view.

@@ -15,7 +15,7 @@ use super::statistics::{Statistics, deviation, median};
 /// Name of the check.
 pub const NAME: &str = "exposure";
 
-/// Directions farther apart than this predict each other too badly, degrees.
+/// Directions farther apart than this, degrees, say too little of each other.
 const SPACING_DEG: f64 = 38.0;
 
 /// Fewer directions have no neighbours to speak of.
@@ -123,7 +123,7 @@ pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Ch
         return Check::not_checked(
             NAME,
             format!(
-                "{}: they predict each other too badly, expected at least {LEAST_DIRECTIONS} within {SPACING_DEG}",
+                "{}: this check needs at least {LEAST_DIRECTIONS}, no farther apart than {SPACING_DEG} degrees",
                 apart(statistics.lights.len(), "light", near_lights.spacing_rad.to_degrees())
             ),
         );

@@ -120,7 +120,7 @@ pub fn check(statistics: &Statistics, explained: &HashSet<ImageSelection>) -> Ch
             return Check::not_checked(
                 NAME,
                 format!(
-                    "{}: they predict each other too badly, expected at least {LEAST_DIRECTIONS} within {SPACING_DEG}",
+                    "{}: this check needs at least {LEAST_DIRECTIONS}, no farther apart than {SPACING_DEG} degrees",
                     apart(count, what, spacing)
                 ),
             );

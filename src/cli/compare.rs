@@ -134,10 +134,10 @@ impl Compare {
             console.text(&table(&rows));
             console.line(format!(
                 "CIEDE2000: its mean, and what 95 % stay below, over {}; the other figures are over all texels. All views \
-                 count alike here; btf model and btf info weight them by the cosine of theta",
+                 count alike here. The figures of btf model and btf info differ: they weight views by the cosine of theta.",
                 counted(report.colour_texels, "texel")
             ));
-            console.line(ledger_text(&subject.ledger));
+            ledger_lines(&subject.ledger).into_iter().for_each(|line| console.line(line));
             if by == By::Components {
                 console.line(match pack::is_packed(model) {
                     true => "by the components of the packed model",
@@ -239,21 +239,24 @@ impl Compare {
 }
 
 /// What the values of a tile take, and of what that is a part.
-fn ledger_text(ledger: &Ledger) -> String {
+fn ledger_lines(ledger: &Ledger) -> [String; 2] {
     let names: Vec<&str> = ledger.parts.iter().map(|part| part.name).collect();
     let (raw, coded) = (ledger.raw_bytes(), ledger.coded_bytes());
-    let ratios =
-        |of: u64| [raw, coded].map(|bytes| ratio_text(of as f64 / bytes.max(1) as f64)).join(" and ");
-    format!(
-        "size: {}, {} as plain numbers and {} as stored; {} of the tile's raw {}, {} of the measurement's raw {}",
-        names.join(" + "),
-        bytes_text(raw),
-        bytes_text(coded),
-        ratios(ledger.tile_bytes),
-        bytes_text(ledger.tile_bytes),
-        ratios(ledger.measurement_bytes),
-        bytes_text(ledger.measurement_bytes)
-    )
+    let of = |bytes: u64, whole: u64| {
+        format!("{} of the {}", ratio_text(whole as f64 / bytes.max(1) as f64), bytes_text(whole))
+    };
+    let parts = |bytes: u64| {
+        format!(
+            "{}, {} of the measured tile, {} of the whole measurement",
+            bytes_text(bytes),
+            of(bytes, ledger.tile_bytes),
+            of(bytes, ledger.measurement_bytes)
+        )
+    };
+    [
+        format!("size of {} as plain numbers: {}", names.join(" + "), parts(raw)),
+        format!("  as stored: {}", parts(coded)),
+    ]
 }
 
 /// Pictures of one size side by side, each under its caption.

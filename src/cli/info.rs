@@ -270,7 +270,7 @@ fn of_packed(about: &pack::About) -> Rows {
                     format!("{}, of these {} of the header and the palette", about.bytes, about.header_bytes),
             }
         ],
-        row!["as arrays of a model", format!("{}, {}", bytes_text(about.raw_bytes), ratio(about.raw_bytes))],
+        row!["unpacked arrays", format!("{}, {}", bytes_text(about.raw_bytes), ratio(about.raw_bytes))],
     ];
     if let Some(raw) = about.tile_bytes {
         let text = format!("{}, {}", bytes_text(raw), ratio(raw));

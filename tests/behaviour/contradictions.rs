@@ -80,7 +80,7 @@ fn pictures_that_are_left_out_are_named() {
     let found = told(&root);
     assert!(found.contains("2 other files ignored"), "{found}");
     assert!(
-        found.contains("pictures without directions, or of those that are dropped, are left out:")
+        found.contains("left out, as they have no direction or one that is dropped:")
             && found.contains("tl40 pl0"),
         "{found}"
     );

@@ -152,7 +152,10 @@ fn a_packed_model_is_compared_like_the_model_that_it_unpacks_to() {
     assert_eq!((&ledger["tile_bytes"], &about["bytes"]), (&about["tile_bytes"], &length.into()));
     assert_eq!(ledger["tile_bytes"], ledger["measurement_bytes"]);
     let told = succeed(&mut compare(&at("w.btfc")));
-    assert!(told.contains("size: packed file, ") && told.contains("of the measurement's raw"), "{told}");
+    assert!(
+        told.contains("size of packed file as plain numbers: ") && told.contains("of the whole measurement"),
+        "{told}"
+    );
     let told = succeed(btf().arg("info").arg(at("w.btfc")));
     assert!(told.contains("of the header") && told.contains("all of the measurement"), "{told}");
     let of_clusters = json(compare(&at("c.model.zarr")).args(["--by", "clusters"]));

@@ -38,8 +38,8 @@ const CENTRES: [usize; 3] = [64, 256, 1024];
 /// Texels that a centre has at least, on average.
 const TEXELS_OF_A_CENTRE: usize = 8;
 
-/// Packs a model, by cosines or by a palette, whichever is better at the target. `residual` is the squared error of the model itself, over all texels and directions, if it is known;
-/// it is only needed to say how good the result is.
+/// Packs a model, by cosines or by a palette, whichever is better at the target. `residual` is the squared error of the
+/// model itself, over all texels and directions, if it is known; it is only needed to say how good the result is.
 ///
 /// # Errors
 /// A target that cannot be met; a model whose parts do not fit together, or that the format has no room for.
@@ -49,13 +49,13 @@ pub fn pack(model: &Model, residual: Option<f64>, target: Target) -> Result<Pack
         if model.texels() < TEXELS_OF_A_CENTRE * count {
             break;
         }
-        let palette = Palette::new(&nearest_of(model, count));
-        let prepared = Prepared::new(model, residual, Some(palette))?;
         let wanted = match (target, &best) {
             (Target::Decibels(decibels), _) => decibels,
             (Target::Bytes(_), Ok(best)) => best.decibels,
             (Target::Bytes(_), Err(_)) => break,
         };
+        let palette = Palette::new(&nearest_of(model, count));
+        let prepared = Prepared::new(model, residual, Some(palette))?;
         if prepared.most_decibels() <= wanted {
             continue;
         }

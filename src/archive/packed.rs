@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use btfkit_formats::{Contents, Samples};
 
 use super::{Source, digest_of};
-use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::run::Context;
 use crate::store::measurement::gather::images_of_texels;
@@ -35,20 +34,7 @@ impl PackedArchive {
     pub(super) fn open(path: &Path) -> Result<Self> {
         let file = PackedFile::open(path)?;
         let format = format!("packed model, {} components", file.outline.components());
-        let description = &file.description;
-        let contents = Contents {
-            format,
-            width: description.size.width as u32,
-            height: description.size.height as u32,
-            channels: description.channels.clone(),
-            sample_type: description.sample_type,
-            views: description.views.clone(),
-            lights: description.lights.clone(),
-            linear: description.transfer == Transfer::Linear,
-            cosine_included: true,
-            assumptions: vec![],
-            remarks: file.outline.texts.clone(),
-        };
+        let contents = Contents { remarks: file.outline.texts.clone(), ..file.description.contents(format) };
         let (notes, memory_bytes) = (file.notes(), file.outline.memory_bytes());
         let (path, digest) = (path.to_owned(), file.digest);
         Ok(Self { path, contents, notes, memory_bytes, digest, packed: Mutex::default() })
@@ -90,10 +76,8 @@ impl Source for PackedArchive {
 
     fn read_images(&self, view: usize, lights: Range<usize>) -> Result<Samples> {
         let packed = self.packed()?;
-        let Packed { components, description, .. } = &*packed;
-        let (sample_type, transfer) = (description.sample_type, description.transfer);
-        let window = description.size.window();
-        let texels = components.samples(view, lights.clone(), window, sample_type, transfer);
+        let description = &packed.description;
+        let texels = packed.samples(view, lights.clone(), description.size.window());
         Ok(images_of_texels(&texels, lights.len(), description.n_channels()))
     }
 

@@ -1,5 +1,7 @@
 //! Amounts of bytes, from text and for people.
 
+use btfkit::stage::cluster::curve::ratio_text;
+
 /// Bytes from text such as 512MiB, 1.5GiB, 2GB, 2G or 1000000: units with an `i`, and a letter alone, are powers of
 /// 1024, `kB`, `MB`, `GB` and `TB` powers of 1000.
 ///
@@ -43,6 +45,11 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
 /// Bytes for people.
 pub(super) fn bytes_text(bytes: u64) -> String {
     indicatif::HumanBytes(bytes).to_string()
+}
+
+/// How many times smaller bytes are than a whole: `1:7.3`.
+pub(super) fn part_text(bytes: u64, whole: u64) -> String {
+    ratio_text(whole as f64 / bytes.max(1) as f64)
 }
 
 #[cfg(test)]

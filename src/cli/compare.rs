@@ -5,7 +5,6 @@ use btfkit::picture::drawing::{CHARACTER, Canvas, text_size};
 use btfkit::picture::{Ending, Picture, false_color};
 use btfkit::run::Context;
 use btfkit::shape::Size;
-use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::compare::{By, Subject};
 use btfkit::stage::ledger::Ledger;
 use btfkit::stage::{baselines, compare, image, pack};
@@ -17,7 +16,7 @@ use clap::{Args, ValueEnum};
 
 use super::sharing::SharingArgs;
 use super::table::{row, table};
-use super::{Console, as_json, bytes_text};
+use super::{Console, as_json, bytes_text, part_text};
 
 /// Show what a model has lost of its measurement: errors in lightness and colour over its tile
 #[derive(Args)]
@@ -199,7 +198,7 @@ impl Compare {
                 found.method,
                 found.setting,
                 found.bytes,
-                ratio_text(report.tile_bytes as f64 / found.bytes as f64),
+                part_text(found.bytes, report.tile_bytes),
                 format!("{:.3}", figures.lightness),
                 figures.psnr_db.map_or("equal".to_owned(), |psnr| format!("{psnr:.2}")),
                 format!("{:.3}", figures.ciede2000),
@@ -242,9 +241,7 @@ impl Compare {
 fn ledger_lines(ledger: &Ledger) -> [String; 2] {
     let names: Vec<&str> = ledger.parts.iter().map(|part| part.name).collect();
     let (raw, coded) = (ledger.raw_bytes(), ledger.coded_bytes());
-    let of = |bytes: u64, whole: u64| {
-        format!("{} of the {}", ratio_text(whole as f64 / bytes.max(1) as f64), bytes_text(whole))
-    };
+    let of = |bytes, whole| format!("{} of the {}", part_text(bytes, whole), bytes_text(whole));
     let parts = |bytes: u64| {
         format!(
             "{}, {} of the measured tile, {} of the whole measurement",

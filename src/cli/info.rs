@@ -5,7 +5,6 @@ use btfkit::lattice::Lattice;
 use btfkit::names::ends_with;
 use btfkit::run::Context;
 use btfkit::stage::about::{self, About, Grown, Kept, Measured, Modelled, Pyramidal, Samples};
-use btfkit::stage::cluster::curve::ratio_text;
 use btfkit::stage::deepzoom::recipe::PyramidRecipe;
 use btfkit::stage::verify::is_pyramid;
 use btfkit::stage::{estimate, import, pack};
@@ -22,7 +21,7 @@ use super::given::Given;
 use super::source::SourceArgs;
 use super::table::{row, table};
 use super::tile::steps;
-use super::{Console, as_json, bytes_text};
+use super::{Console, as_json, bytes_text, part_text};
 
 /// Show what an archive or a store holds, and how large an archive will be once imported
 #[derive(Args)]
@@ -250,8 +249,7 @@ fn of_measurement(about: &Measured) -> Rows {
 
 fn of_packed(about: &pack::About) -> Rows {
     let ([width, height], [views, lights]) = (about.size, about.directions);
-    let ratio =
-        |of: u64| format!("the file is {} of them", ratio_text(of as f64 / about.bytes.max(1) as f64));
+    let ratio = |of: u64| format!("the file is {} of them", part_text(about.bytes as u64, of));
     let mut rows = vec![
         row!["kind", about.kind],
         row!["size", format!("{width}x{height}, {}", about.channels.join(" "))],
@@ -291,13 +289,12 @@ fn of_packed(about: &pack::About) -> Rows {
 
 /// Bytes as a part of a tile and of a measurement.
 fn of_both(bytes: u64, tile: u64, measurement: u64) -> String {
-    let ratio = |of: u64| ratio_text(of as f64 / bytes.max(1) as f64);
     format!(
         "{}, {} of the tile's raw {}, {} of the measurement's raw {}",
         bytes_text(bytes),
-        ratio(tile),
+        part_text(bytes, tile),
         bytes_text(tile),
-        ratio(measurement),
+        part_text(bytes, measurement),
         bytes_text(measurement)
     )
 }
@@ -404,10 +401,10 @@ fn of_model(about: &Modelled) -> Rows {
                 rows.push(row!["  components", report.components]);
                 rows.extend(report.note().map(|note| row!["  note", note]));
                 rows.extend(report.psnr_db.map(|psnr| row!["  PSNR", format!("{psnr:.2} dB")]));
-                let of = ratio_text(report.tile_bytes as f64 / report.bytes.max(1) as f64);
                 let text = format!(
-                    "{}, {of} of the tile's raw {}",
+                    "{}, {} of the tile's raw {}",
                     bytes_text(report.bytes),
+                    part_text(report.bytes, report.tile_bytes),
                     bytes_text(report.tile_bytes)
                 );
                 rows.push(row!["  arrays", text]);

@@ -52,7 +52,7 @@ use btfkit::run::budget::{Allowance, cannot_start, expect_stack, return_large_bu
 use btfkit::run::progress::{Progress, Silent};
 use btfkit::run::{Context, Existing};
 use btfkit::text::{escaped, escaped_json, escaped_lines};
-use bytes::bytes_text;
+use bytes::{bytes_text, part_text};
 use clap::{Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 use each::Ended;
 use given::Given;
@@ -155,11 +155,7 @@ enum Command {
 
 /// Runs the program.
 pub(crate) fn run() -> ExitCode {
-    if let Err(error) = expect_stack() {
-        Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);
-        return ExitCode::from(exit_code(error.kind()));
-    }
-    let arguments = match location::arguments(std::env::args_os()) {
+    let arguments = match expect_stack().and_then(|()| location::arguments(std::env::args_os())) {
         Ok(arguments) => arguments,
         Err(error) => {
             Console { quiet: false, found: false, brief: false, json: false }.failure(None, &error);

@@ -103,6 +103,13 @@ impl LightnessCodes {
         code[0]
     }
 
+    /// The codes of all samples, one for every pair of a texel and a light.
+    pub(crate) fn of(&self, samples: &Samples) -> Vec<u8> {
+        let mut codes = vec![0; samples.len() / self.weights.luminance.len()];
+        self.fill(samples, &mut codes);
+        codes
+    }
+
     /// Codes of all samples, one for every `channels` of them.
     pub fn fill(&self, samples: &Samples, codes: &mut [u8]) -> Remarkable {
         let channels = self.weights.luminance.len();

@@ -108,10 +108,11 @@ impl Curve {
     /// How many of a run of samples the curve does not hold.
     pub(crate) fn unheld(&self, samples: &Samples, range: Range<usize>) -> Unheld {
         let mut unheld = Unheld::default();
+        let [least, largest] = self.range();
         let mut count = |sample: f64| {
             if !sample.is_finite() {
                 unheld.not_finite += 1;
-            } else if exact(sample, self.transfer).abs() > f64::from(LARGEST) {
+            } else if !(least..=largest).contains(&sample) {
                 unheld.beyond += 1;
             }
         };
@@ -133,17 +134,12 @@ impl Curve {
     }
 }
 
-/// A sample on the curve.
-fn exact(sample: f64, transfer: Transfer) -> f64 {
+fn on_curve(sample: f64, transfer: Transfer) -> f32 {
     let value = match transfer {
         Transfer::Srgb => sample,
         Transfer::Linear => Transfer::Srgb.encode(sample),
     };
-    f64::from(WHITE) * value
-}
-
-fn on_curve(sample: f64, transfer: Transfer) -> f32 {
-    let value = exact(sample, transfer) as f32;
+    let value = (f64::from(WHITE) * value) as f32;
     if value.is_finite() { value.clamp(-LARGEST, LARGEST) } else { 0.0 }
 }
 

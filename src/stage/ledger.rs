@@ -73,9 +73,7 @@ impl Ledger {
     }
 
     fn of_parts(parts: Vec<Part>, measured: &Description, texels: usize) -> Self {
-        let measurement_bytes = measured.bytes();
-        let tile_bytes = measurement_bytes / measured.size.texels() as u64 * texels as u64;
-        Self { parts, tile_bytes, measurement_bytes }
+        Self { parts, tile_bytes: measured.bytes_of(texels), measurement_bytes: measured.bytes() }
     }
 
     /// Bytes of all parts as plain numbers.

@@ -1,8 +1,9 @@
 //! Packed models, `NAME.btfc`, as they are opened to be looked at, rendered, compared or exported.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use btfkit_formats::{Angles, Direction, SampleType};
+use btfkit_formats::{Angles, Direction, SampleType, Samples};
 use btfkit_packed as packed;
 
 use super::measurement::Description;
@@ -12,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::method::value::components::Components;
 use crate::names::ends_with;
 use crate::run::{Context, recipe};
-use crate::shape::Size;
+use crate::shape::{Size, Window};
 use crate::words::counted;
 use crate::zarr::samples_named;
 
@@ -191,6 +192,12 @@ impl Packed {
         let file = PackedFile::open(path)?;
         let model = file.model(context)?;
         Ok(Self::of(file, model))
+    }
+
+    /// The samples of a window of the tile under a view and some lights, [y, x, light, channel].
+    pub(crate) fn samples(&self, view: usize, lights: Range<usize>, window: Window) -> Samples {
+        let Description { sample_type, transfer, .. } = self.description;
+        self.components.samples(view, lights, window, sample_type, transfer)
     }
 
     /// As it is evaluated, once it is decoded.

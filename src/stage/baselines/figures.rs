@@ -89,6 +89,7 @@ pub(super) struct Judge {
 pub(super) struct OfView<'a> {
     judge: &'a Judge,
     measured: &'a Samples,
+    /// L* codes [texel, light].
     codes: Vec<u8>,
     /// Lights whose pictures are looked at.
     lights: Vec<usize>,
@@ -109,12 +110,7 @@ impl Judge {
     pub(super) fn of_view<'a>(&'a self, view: usize, measured: &'a Samples) -> Result<OfView<'a>> {
         let [lights, _] = self.texel;
         let shown = (0..lights).filter(|light| (view * lights + light).is_multiple_of(self.strides[0]));
-        Ok(OfView { judge: self, measured, codes: self.codes_of(measured), lights: shown.collect() })
-    }
-
-    /// L* codes [texel, light].
-    fn codes_of(&self, samples: &Samples) -> Vec<u8> {
-        (0..samples.len()).step_by(self.texel[1]).map(|at| self.codes.code(samples, at)).collect()
+        Ok(OfView { judge: self, measured, codes: self.codes.of(measured), lights: shown.collect() })
     }
 }
 
@@ -122,7 +118,7 @@ impl OfView<'_> {
     /// Sums of samples of the same texels under the same view, [texel, light, channel].
     pub(super) fn sums(&self, samples: &Samples) -> Sums {
         let Judge { decoder, texel: [lights, channels], size, .. } = self.judge;
-        let codes = self.judge.codes_of(samples);
+        let codes = self.judge.codes.of(samples);
         let mut sums = Sums::default();
         for at in 0..samples.len() {
             let [a, b] = [self.measured.value(at), samples.value(at)].map(|value| value.unwrap_or(0.0));

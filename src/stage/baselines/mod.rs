@@ -73,7 +73,7 @@ pub fn run(model: &Model, measurement: &Measurement, context: &Context<'_>) -> R
     let tile = model.tile()?;
     let (bounds, offsets) = (tile.bounds(), tile.offsets_in_bounds());
     let texels = tile.size.texels();
-    let tile_bytes = description.bytes() / description.size.texels() as u64 * texels as u64;
+    let tile_bytes = description.bytes_of(texels);
     let (mut methods, notes) = others(model, measurement, context)?;
     let mut sizes: Vec<u64> = methods.iter().flat_map(Method::bytes).collect();
     sizes.extend(RATIOS.map(|ratio| tile_bytes / ratio));

@@ -136,7 +136,7 @@ pub(crate) fn enough_bytes(
 ) -> u64 {
     let arrangement = Arrangement::new(&description.views, description.lights.len());
     let stride = arrangement.stride();
-    let brdf = description.bytes() / description.size.texels().max(1) as u64;
+    let brdf = description.bytes_of(1);
     let clusters = match options.amount {
         Amount::Usual => USUAL_CLUSTERS,
         Amount::Clusters(clusters) => clusters,

@@ -82,7 +82,7 @@ impl Plan {
             taken_from: None,
             representative_bytes: arrays.representative_bytes(),
             index_bytes: arrays.index_bytes(),
-            tile_bytes: description.bytes() / description.size.texels() as u64 * texels as u64,
+            tile_bytes: description.bytes_of(texels),
             measurement_bytes: description.bytes(),
         };
         self.model.finish(Stage::Cluster, &self.recipe, &report, context)?;

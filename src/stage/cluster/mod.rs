@@ -229,7 +229,7 @@ pub fn plan(options: &Options) -> Result<Plan> {
         }
         Amount::Error(error) if error > 0.0 => most.min(MOST_SEARCHED),
         Amount::Ratio(ratio) if ratio > 0.0 => {
-            let brdf = description.bytes() / description.size.texels() as u64;
+            let brdf = description.bytes_of(1);
             clusters_of_ratio(description.bytes(), brdf, tile.size.texels() as u64, ratio).min(most)
         }
         Amount::Error(number) | Amount::Ratio(number) => {

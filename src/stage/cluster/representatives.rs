@@ -34,10 +34,7 @@ impl Plan {
             });
         }
         let representatives = self.middles(rule, clustered, context)?;
-        let codes = self.measurement.description().codes()?;
-        let [_, _, _, channels] = representatives.shape;
-        let samples = &representatives.samples;
-        let plain: Vec<u8> = (0..samples.len()).step_by(channels).map(|at| codes.code(samples, at)).collect();
+        let plain = self.measurement.description().codes()?.of(&representatives.samples);
         Ok(Represented { vectors: self.arrangement.arranged(&plain), representatives })
     }
 

@@ -212,8 +212,7 @@ impl Plan {
             not_finite,
             psnr_db: ratio.is_finite().then(|| 10.0 * ratio.log10()),
             bytes: self.model.bytes_of_components(components)?,
-            tile_bytes: description.bytes() / description.size.texels() as u64
-                * self.tile.size.texels() as u64,
+            tile_bytes: description.bytes_of(self.tile.size.texels()),
             texts: BTreeMap::new(),
         };
         self.model.finish(Stage::Components, &self.recipe, &report, context)?;

@@ -1,29 +1,14 @@
 //! One HDF5 file with the arrays and attributes of the store.
 
-use btfkit_formats::Contents;
-
 use super::{Options, Source, Written};
 use crate::archive::hdf5::Writer;
-use crate::color::Transfer;
 use crate::error::Result;
 use crate::run::progress::Counted;
 use crate::run::{Context, read_ahead};
 
 pub(super) fn write(source: &Source, options: &Options, context: &Context<'_>) -> Result<Written> {
     let description = source.description();
-    let contents = Contents {
-        format: "measurement store".to_owned(),
-        width: description.size.width as u32,
-        height: description.size.height as u32,
-        channels: description.channels.clone(),
-        sample_type: description.sample_type,
-        views: description.views.clone(),
-        lights: description.lights.clone(),
-        linear: description.transfer == Transfer::Linear,
-        cosine_included: true,
-        assumptions: Vec::new(),
-        remarks: Vec::new(),
-    };
+    let contents = description.contents("measurement store".to_owned());
     let mut writer =
         Writer::create(&options.output, &contents, &source.attributes()?)?.with_existing(context.existing);
     let whole = description.size.window();

@@ -134,12 +134,7 @@ impl Source {
     fn read_reflectance(&self, view: usize, window: Window) -> Result<Samples> {
         match &self.0 {
             Kept::Measurement(measurement) => measurement.read_reflectance(view, window),
-            Kept::Packed(packed) => {
-                let Packed { components, description, .. } = &**packed;
-                let lights = 0..description.lights.len();
-                let (sample_type, transfer) = (description.sample_type, description.transfer);
-                Ok(components.samples(view, lights, window, sample_type, transfer))
-            }
+            Kept::Packed(packed) => Ok(packed.samples(view, 0..packed.description.lights.len(), window)),
         }
     }
 
@@ -148,11 +143,7 @@ impl Source {
     fn read_luminance(&self, view: usize, window: Window) -> Result<Vec<u8>> {
         match &self.0 {
             Kept::Measurement(measurement) => measurement.read_luminance(view, window),
-            Kept::Packed(packed) => {
-                let (samples, codes) = (self.read_reflectance(view, window)?, packed.description.codes()?);
-                let channels = packed.description.n_channels();
-                Ok((0..samples.len()).step_by(channels).map(|at| codes.code(&samples, at)).collect())
-            }
+            Kept::Packed(packed) => Ok(packed.description.codes()?.of(&self.read_reflectance(view, window)?)),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::kernel::predict::Shape;
 use crate::shape::Size;
 use crate::zarr::codec::Chunk;
-use btfkit_formats::{Direction, SampleType};
+use btfkit_formats::{Contents, Direction, SampleType};
 
 /// Most bytes of samples in one shard.
 pub(super) const SHARD_LIMIT_BYTES: usize = 256 << 20;
@@ -79,6 +79,28 @@ impl Description {
     /// Bytes of all samples.
     pub fn bytes(&self) -> u64 {
         self.view_bytes() * self.views.len() as u64
+    }
+
+    /// Bytes of the samples of so many texels.
+    pub(crate) fn bytes_of(&self, texels: usize) -> u64 {
+        texels as u64 * (self.views.len() * self.texel_bytes()) as u64
+    }
+
+    /// The same as an archive says it of itself.
+    pub(crate) fn contents(&self, format: String) -> Contents {
+        Contents {
+            format,
+            width: self.size.width as u32,
+            height: self.size.height as u32,
+            channels: self.channels.clone(),
+            sample_type: self.sample_type,
+            views: self.views.clone(),
+            lights: self.lights.clone(),
+            linear: self.transfer == Transfer::Linear,
+            cosine_included: true,
+            assumptions: Vec::new(),
+            remarks: Vec::new(),
+        }
     }
 
     /// What turns its samples into linear RGB.

@@ -7,6 +7,7 @@ use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::compare::{By, Subject};
 use btfkit::stage::ledger::Ledger;
+use btfkit::stage::partial::Shared;
 use btfkit::stage::{baselines, compare, image, pack};
 use btfkit::store::model::Model;
 use btfkit::store::{self, model};
@@ -103,10 +104,9 @@ impl Compare {
         let report = match self.sharing.sharing() {
             None => compare::run(&subject, context)?,
             Some(sharing) => {
-                let shared = compare::run_shared(&subject, &sharing, context)?;
-                let Some(report) = shared.report else {
-                    let views = counted(shared.views, "view");
-                    console.line(format!("{}: {} of {views} compared", shared.folder.display(), shared.done));
+                let Shared { told, result } = compare::run_shared(&subject, &sharing, context)?;
+                let Some(report) = result else {
+                    console.line(told);
                     return Ok(());
                 };
                 report

@@ -6,6 +6,7 @@ use btfkit::picture::Ending;
 use btfkit::run::Context;
 use btfkit::shape::Size;
 use btfkit::stage::judge::{self, Judged, Normals, Origin, Report, Row};
+use btfkit::stage::partial::Shared;
 use btfkit::store::{enlarged, measurement, model};
 use btfkit::text::escaped;
 use btfkit::words::counted;
@@ -86,10 +87,9 @@ impl Judge {
         let Judged { report, sheet } = match self.sharing.sharing() {
             None => judge::run(&options, context)?,
             Some(sharing) => {
-                let shared = judge::run_shared(&options, &sharing, context)?;
-                let Some(judged) = shared.judged else {
-                    let parts = counted(shared.parts, "part");
-                    console.line(format!("{}: {} of {parts} judged", shared.folder.display(), shared.done));
+                let Shared { told, result } = judge::run_shared(&options, &sharing, context)?;
+                let Some(judged) = result else {
+                    console.line(told);
                     return Ok(());
                 };
                 judged

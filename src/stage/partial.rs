@@ -15,6 +15,7 @@ use crate::disk::temporary::{Temporary, write_file};
 use crate::error::{Error, Result};
 use crate::run::recipe;
 use crate::run::shard::Shard;
+use crate::words::counted;
 use crate::zarr::metadata;
 
 /// Where results of units are kept, and what a run does about them.
@@ -24,6 +25,70 @@ pub struct Sharing {
     pub folder: PathBuf,
     /// The part of the units that this run does; none where it only puts results together.
     pub shard: Option<Shard>,
+}
+
+/// Work that runs share, as far as it is done by all of them.
+#[derive(Clone, Debug)]
+pub struct Shared<R> {
+    /// How far it is, in words: `sums/1f0c: 3 of 9 views compared`.
+    pub told: String,
+    /// The result, once all units are done.
+    pub result: Option<R>,
+}
+
+/// A work that is made of units, for [`Sharing::run`].
+pub(crate) struct Work<'a> {
+    /// All that its results depend on.
+    pub(crate) what: &'a Value,
+    /// How many units it has.
+    pub(crate) units: usize,
+    /// What a unit is, and what it is when it is done: `["view", "compared"]`.
+    pub(crate) words: [&'a str; 2],
+}
+
+impl Sharing {
+    /// Does this run's part of the units that are missing, by `make`, which keeps the result of each; where those of all
+    /// units are there, puts them together in their order. `check` refuses a result that no unit has.
+    ///
+    /// # Errors
+    /// Those of the steps; and [`crate::ErrorKind::Missing`] where nothing is to be done but something is missing.
+    pub(crate) fn run<T: DeserializeOwned, R>(
+        &self,
+        work: &Work<'_>,
+        check: impl Fn(&T) -> Result<()>,
+        make: impl FnOnce(&[usize], &Partial) -> Result<()>,
+        put_together: impl FnOnce(Vec<T>) -> Result<R>,
+    ) -> Result<Shared<R>> {
+        let partial = Partial::at(&self.folder, work.what)?;
+        let kept = || {
+            let read = |unit| {
+                let Some(found) = partial.read::<T>(unit) else { return Ok(None) };
+                check(&found).map(|()| Some(found)).map_err(|error| {
+                    error
+                        .context(partial.path(unit).display())
+                        .hint("delete this file and run its part again")
+                })
+            };
+            (0..work.units).map(read).collect::<Result<Vec<Option<T>>>>()
+        };
+        if let Some(shard) = self.shard {
+            let found = kept()?;
+            let missing: Vec<usize> =
+                (0..work.units).filter(|&unit| shard.has(unit) && found[unit].is_none()).collect();
+            make(&missing, &partial)?;
+        }
+        let results = kept()?;
+        let done = results.iter().flatten().count();
+        let [unit, finished] = work.words;
+        let told =
+            format!("{}: {done} of {} {finished}", partial.folder.display(), counted(work.units, unit));
+        if done < work.units && self.shard.is_none() {
+            return Err(Error::missing(told)
+                .hint("run all parts first: the same command with --shard K/N instead of --reduce"));
+        }
+        let all: Option<Vec<T>> = results.into_iter().collect();
+        Ok(Shared { told, result: all.map(put_together).transpose()? })
+    }
 }
 
 /// Results of the units of one work.
@@ -38,7 +103,7 @@ impl Partial {
     ///
     /// # Errors
     /// Those of making the folder, and a place inside of a store.
-    pub(crate) fn at(folder: &Path, what: &Value) -> Result<Self> {
+    fn at(folder: &Path, what: &Value) -> Result<Self> {
         let digest = recipe::digest(what);
         let folder = folder.join(recipe::shortened(&digest));
         expect_outside_stores(&folder)?;
@@ -46,18 +111,13 @@ impl Partial {
         Ok(Self { folder, digest })
     }
 
-    /// Where they lie.
-    pub(crate) fn folder(&self) -> &Path {
-        &self.folder
-    }
-
     /// The file of a unit.
-    pub(crate) fn path(&self, unit: usize) -> PathBuf {
+    fn path(&self, unit: usize) -> PathBuf {
         self.folder.join(format!("{unit}.json"))
     }
 
     /// The result of a unit; `None` where it is not there, or damaged: then it has to be made again.
-    pub(crate) fn read<T: DeserializeOwned>(&self, unit: usize) -> Option<T> {
+    fn read<T: DeserializeOwned>(&self, unit: usize) -> Option<T> {
         let bytes = metadata::read_file(&self.path(unit)).ok()??;
         let mut document: Value = serde_json::from_slice(&bytes).ok()?;
         let value = document.get_mut("value")?.take();

@@ -16,13 +16,12 @@ use crate::run::{Context, units};
 use crate::shape::Window;
 use crate::stage::cluster::open_measurement_of;
 use crate::stage::ledger::Ledger;
-use crate::stage::partial::{Partial, Sharing};
+use crate::stage::partial::{Shared, Sharing, Work};
 pub use crate::stage::values::By;
 use crate::stage::values::{TileSamples, TileValues};
 use crate::store::measurement::Measurement;
 use crate::store::model::{Model, Stage};
 use crate::store::packed::{Packed, is_packed};
-use crate::words::counted;
 
 /// Texels whose colour differences are taken; the other figures count every texel.
 const COLOUR_TEXELS: usize = 1024;
@@ -344,19 +343,6 @@ pub(crate) fn same_directions(a: &[Direction], b: &[Direction]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(near)
 }
 
-/// What was compared by a run that shares the work.
-#[derive(Clone, Debug, Serialize)]
-pub struct Shared {
-    /// Views of all parts that are compared by now.
-    pub done: usize,
-    /// Views that there are.
-    pub views: usize,
-    /// Where their results lie.
-    pub folder: PathBuf,
-    /// The errors, once all views are compared.
-    pub report: Option<Report>,
-}
-
 /// Re-makes the tile under every pair of directions and compares it with the measurement.
 ///
 /// # Errors
@@ -373,43 +359,22 @@ pub fn run(subject: &Subject, context: &Context<'_>) -> Result<Report> {
 ///
 /// # Errors
 /// As [`run`]; and [`crate::ErrorKind::Missing`] where nothing is to be compared but something is missing.
-pub fn run_shared(subject: &Subject, sharing: &Sharing, context: &Context<'_>) -> Result<Shared> {
-    let n_views = subject.measurement.description().views.len();
+pub fn run_shared(subject: &Subject, sharing: &Sharing, context: &Context<'_>) -> Result<Shared<Report>> {
     let what = json!({
         "stage": "compare", "method": METHOD, "measurement": subject.measurement.digest(),
         "model": subject.digest,
     });
-    let partial = Partial::at(&sharing.folder, &what)?;
     let comparison = Comparison::open(subject)?;
     let counts = comparison.counts();
-    let kept = || {
-        let read = |view| match partial.read::<Sums>(view) {
-            Some(sums) => sums.expect_possible(&counts).map(|()| Some(sums)).map_err(|error| {
-                error.context(partial.path(view).display()).hint("delete this file and run its part again")
-            }),
-            None => Ok(None),
-        };
-        (0..n_views).map(read).collect::<Result<Vec<_>>>()
-    };
-    if let Some(shard) = sharing.shard {
-        let found = kept()?;
-        let missing: Vec<usize> =
-            (0..n_views).filter(|&view| shard.has(view) && found[view].is_none()).collect();
-        comparison.sums(&missing, context, |view, sums| partial.write(view, sums))?;
-    }
-    let sums = kept()?;
-    let done = sums.iter().flatten().count();
-    let folder = partial.folder().to_owned();
-    if done < n_views && sharing.shard.is_none() {
-        return Err(Error::missing(format!(
-            "{}: {done} of {} compared",
-            folder.display(),
-            counted(n_views, "view")
-        ))
-        .hint("run all parts first: the same command with --shard K/N instead of --reduce"));
-    }
-    let all: Option<Vec<Sums>> = sums.into_iter().collect();
-    Ok(Shared { done, views: n_views, folder, report: all.map(|sums| comparison.report(&sums)) })
+    let views = subject.measurement.description().views.len();
+    sharing.run(
+        &Work { what: &what, units: views, words: ["view", "compared"] },
+        |sums: &Sums| sums.expect_possible(&counts),
+        |missing, partial| {
+            comparison.sums(missing, context, |view, sums| partial.write(view, sums)).map(|_| ())
+        },
+        |sums| Ok(comparison.report(&sums)),
+    )
 }
 
 /// A model and a measurement, with what all views have in common.

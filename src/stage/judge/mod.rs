@@ -22,8 +22,7 @@ use crate::error::{Error, Result};
 use crate::picture::Picture;
 use crate::run::Context;
 use crate::shape::Size;
-use crate::stage::partial::{Partial, Sharing};
-use crate::words::counted;
+use crate::stage::partial::{Shared, Sharing, Work};
 pub use crops::Origin;
 use judging::{Judging, Part};
 pub use report::{LatticePeak, NormalRows, Normals, Pair, Report, Row, Rows};
@@ -64,18 +63,6 @@ pub struct Judged {
     pub sheet: Option<Picture>,
 }
 
-/// What was judged by a run that shares the work.
-pub struct Shared {
-    /// Parts of the work that are done by now, by all runs.
-    pub done: usize,
-    /// Parts that there are: the whole of the subject, each pair of directions, and the normals.
-    pub parts: usize,
-    /// Where their results lie.
-    pub folder: PathBuf,
-    /// The result, once all parts are done.
-    pub judged: Option<Judged>,
-}
-
 /// Judges.
 ///
 /// # Errors
@@ -97,24 +84,12 @@ pub fn run(options: &Options, context: &Context<'_>) -> Result<Judged> {
 ///
 /// # Errors
 /// As [`run`]; and [`crate::ErrorKind::Missing`] where nothing is to be judged but something is missing.
-pub fn run_shared(options: &Options, sharing: &Sharing, context: &Context<'_>) -> Result<Shared> {
+pub fn run_shared(options: &Options, sharing: &Sharing, context: &Context<'_>) -> Result<Shared<Judged>> {
     let judging = Judging::open(options, context)?;
-    let partial = Partial::at(&sharing.folder, &judging.what()?)?;
-    let units = judging.units();
-    if let Some(shard) = sharing.shard {
-        let is_left = |&unit: &usize| shard.has(unit) && partial.read::<Part>(unit).is_none();
-        let left: Vec<usize> = (0..units).filter(is_left).collect();
-        judging.work(&left, context, |unit, part| partial.write(unit, &part))?;
-    }
-    let kept: Vec<Option<Part>> = (0..units).map(|unit| partial.read(unit)).collect();
-    let done = kept.iter().flatten().count();
-    let folder = partial.folder().to_owned();
-    if done < units && sharing.shard.is_none() {
-        let all = counted(units, "part");
-        return Err(Error::missing(format!("{}: {done} of {all} judged", folder.display()))
-            .hint("run all parts first: the same command with --shard K/N instead of --reduce"));
-    }
-    let parts: Option<Vec<Part>> = kept.into_iter().collect();
-    let judged = parts.map(|parts| judging.judged(parts, context)).transpose()?;
-    Ok(Shared { done, parts: units, folder, judged })
+    sharing.run(
+        &Work { what: &judging.what()?, units: judging.units(), words: ["part", "judged"] },
+        |_: &Part| Ok(()),
+        |missing, partial| judging.work(missing, context, |unit, part| partial.write(unit, &part)),
+        |parts| judging.judged(parts, context),
+    )
 }
